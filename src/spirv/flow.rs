@@ -3,7 +3,6 @@
 use super::evaluate::evaluate;
 use super::instruction::Instruction;
 use super::op;
-use std::collections::{HashMap, HashSet};
 
 /// What is known of an id. A value only ever moves down this list.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -26,19 +25,28 @@ impl Value {
     }
 }
 
-/// The blocks of a function and their places by their labels. A block comes after those that dominate it.
-pub struct Blocks<'a> {
-    pub all: Vec<&'a [Instruction<'a>]>,
-    places: HashMap<u32, usize>,
+/// A set of a module's ids.
+pub struct Ids(Vec<bool>);
+
+impl Ids {
+    /// Empty, for ids below `bound`.
+    pub fn new(bound: u32) -> Self {
+        Self(vec![false; bound as usize])
+    }
+
+    pub fn insert(&mut self, id: u32) {
+        self.0[id as usize] = true;
+    }
+
+    /// Of any word, also one that is no id.
+    pub fn contains(&self, word: u32) -> bool {
+        self.0.get(word as usize) == Some(&true)
+    }
 }
 
-impl<'a> Blocks<'a> {
-    /// Of instructions that begin with a label and end with a block's last.
-    pub fn new(instructions: &'a [Instruction<'a>]) -> Self {
-        let all: Vec<_> = instructions.chunk_by(|_, next| next.opcode != op::LABEL).collect();
-        let places = all.iter().enumerate().map(|(place, block)| (label(block), place)).collect();
-        Self { all, places }
-    }
+/// The blocks of a function, from its first label to its last block's last instruction. A block comes after those that dominate it.
+pub fn blocks<'a>(instructions: &'a [Instruction<'a>]) -> Vec<&'a [Instruction<'a>]> {
+    instructions.chunk_by(|_, next| next.opcode != op::LABEL).collect()
 }
 
 pub fn label(block: &[Instruction]) -> u32 {
@@ -50,13 +58,15 @@ pub struct Flow {
     /// What is known of each id, at its place.
     values: Vec<Value>,
     /// The types whose values are followed: booleans and 32-bit integers.
-    pub scalars: HashSet<u32>,
+    pub scalars: Ids,
     /// Labels of blocks that may be executed.
-    pub reached: HashSet<u32>,
-    /// Edges between blocks that may be taken, as labels.
-    pub edges: HashSet<(u32, u32)>,
-    /// Number of them that end at a label.
-    incoming: HashMap<u32, usize>,
+    pub reached: Ids,
+    /// By label, place of the block in its function.
+    places: Vec<u32>,
+    /// By place of a block of the latest function, the labels of those from which edges to it may be taken.
+    origins: Vec<Vec<u32>>,
+    /// By the same, number of edges to it that may be taken.
+    incoming: Vec<u32>,
 }
 
 impl Flow {
@@ -64,10 +74,11 @@ impl Flow {
     pub fn new(bound: u32) -> Self {
         Self {
             values: vec![Varying; bound as usize],
-            scalars: HashSet::new(),
-            reached: HashSet::new(),
-            edges: HashSet::new(),
-            incoming: HashMap::new(),
+            scalars: Ids::new(bound),
+            reached: Ids::new(bound),
+            places: vec![0; bound as usize],
+            origins: Vec::new(),
+            incoming: Vec::new(),
         }
     }
 
@@ -98,29 +109,33 @@ impl Flow {
     /// Is its result followed? It is where a number or a truth is computed or comes from another block.
     fn follows(&self, Instruction { opcode, words }: &Instruction) -> bool {
         let known = matches!(*opcode, op::I_ADD..=op::S_MOD | op::LOGICAL_EQUAL..=op::S_LESS_THAN_EQUAL | op::PHI);
-        known && self.scalars.contains(&words[0])
+        known && self.scalars.contains(words[0])
     }
 
     /// Finds the values of a function and the edges that may be taken.
-    pub fn propagate(&mut self, blocks: &Blocks) {
-        for instruction in blocks.all.iter().copied().flatten() {
+    pub fn propagate(&mut self, blocks: &[&[Instruction]]) {
+        for instruction in blocks.iter().copied().flatten() {
             if self.follows(instruction) {
                 self.set(instruction.words[1], Unknown);
             }
         }
-        self.reached.extend(blocks.all.first().map(|entry| label(entry)));
+        for (place, block) in (0..).zip(blocks) {
+            self.places[label(block) as usize] = place;
+        }
+        (self.origins, self.incoming) = (vec![Vec::new(); blocks.len()], vec![0; blocks.len()]);
+        blocks.iter().take(1).for_each(|entry| self.reached.insert(label(entry)));
         let mut changed = true;
         while std::mem::take(&mut changed) {
-            for block in &blocks.all {
-                if self.reached.contains(&label(block)) {
-                    changed |= self.execute(block, blocks);
+            for block in blocks {
+                if self.reached.contains(label(block)) {
+                    changed |= self.execute(block);
                 }
             }
         }
     }
 
     /// Returns whether anything is known now that was not before.
-    fn execute(&mut self, block: &[Instruction], blocks: &Blocks) -> bool {
+    fn execute(&mut self, block: &[Instruction]) -> bool {
         let (here, mut changed) = (label(block), false);
         for instruction in block {
             if self.follows(instruction) {
@@ -133,28 +148,47 @@ impl Flow {
                 self.set(id, value);
             }
         }
-        for target in self.targets(block, blocks) {
+        for target in self.targets(block) {
             self.reached.insert(target);
-            if self.edges.insert((here, target)) {
-                *self.incoming.entry(target).or_default() += 1;
+            if self.add_edge(here, target) {
+                let place = self.place(target);
+                self.incoming[place] += 1;
                 changed = true;
             }
         }
         changed
     }
 
+    fn place(&self, label: u32) -> usize {
+        self.places[label as usize] as usize
+    }
+
+    /// Notes an edge between the blocks of two labels; returns whether it is new.
+    pub fn add_edge(&mut self, from: u32, to: u32) -> bool {
+        let (is_new, place) = (!self.has_edge(from, to), self.place(to));
+        if is_new {
+            self.origins[place].push(from);
+        }
+        is_new
+    }
+
+    /// Whether an edge between the blocks of two labels may be taken.
+    pub fn has_edge(&self, from: u32, to: u32) -> bool {
+        self.origins[self.place(to)].contains(&from)
+    }
+
     /// What a phi of block `here` is, of values that come along edges that may be taken.
     fn joined(&self, here: u32, ways: &[u32]) -> Value {
-        let taken = ways.chunks_exact(2).filter(|way| self.edges.contains(&(way[1], here)));
+        let taken = ways.chunks_exact(2).filter(|way| self.has_edge(way[1], here));
         taken.map(|way| self.value(way[0])).fold(Unknown, Value::meet)
     }
 
     /// Where a block may go on, as far as is known.
-    fn targets(&self, block: &[Instruction], blocks: &Blocks) -> Vec<u32> {
+    fn targets(&self, block: &[Instruction]) -> Vec<u32> {
         let Instruction { opcode, words } = block[block.len() - 1];
         match opcode {
             op::BRANCH => vec![words[0]],
-            op::BRANCH_CONDITIONAL => match (self.decided(block, blocks), self.value(words[0])) {
+            op::BRANCH_CONDITIONAL => match (self.decided(block), self.value(words[0])) {
                 (Some([target, _]), _) => vec![target],
                 (None, Unknown) => Vec::new(),
                 (None, _) => words[1..3].to_vec(),
@@ -167,10 +201,10 @@ impl Flow {
 
     /// Where a conditional branch whose condition is constant goes, and where it never goes. The branch that closes a loop counts as
     /// undecided, because every loop of SPIR-V has one.
-    pub fn decided(&self, block: &[Instruction], blocks: &Blocks) -> Option<[u32; 2]> {
+    pub fn decided(&self, block: &[Instruction]) -> Option<[u32; 2]> {
         let Instruction { opcode, words } = block[block.len() - 1];
         let &[condition, yes, no, ..] = words else { return None };
-        let back = |target: u32| blocks.places.get(&target) <= blocks.places.get(&label(block));
+        let back = |target: u32| self.place(target) <= self.place(label(block));
         if opcode != op::BRANCH_CONDITIONAL || yes == no || back(yes) || back(no) {
             return None;
         }
@@ -185,6 +219,6 @@ impl Flow {
     /// because it is one may they leave what lies between.
     pub fn is_left_early(&self, block: &[Instruction]) -> bool {
         let merge = block.iter().find(|i| i.opcode == op::SELECTION_MERGE).map(|i| i.words[0]);
-        merge.is_some_and(|merge| self.incoming.get(&merge).is_some_and(|&count| count > 1))
+        merge.is_some_and(|merge| self.incoming[self.place(merge)] > 1)
     }
 }

@@ -2,11 +2,11 @@
 //! they have read, validated and inlined all of it: nine tenths of the path tracer are effects that a simple scene lacks.
 //!
 //! No instruction that computes something is changed, so results keep their bits as far as a driver's own optimisations are exact.
-use super::flow::{Blocks, Flow, Value, label};
+use super::flow::{self, Flow, Ids, Value, label};
 use super::instruction::{BOUND, HEADER, Instruction, instructions};
 use super::op;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 /// The decoration that names a specialisation constant by a number.
 const SPEC_ID: u32 = 1;
@@ -48,16 +48,16 @@ struct Specialised<'a> {
     constants: &'a [(u32, u32)],
     /// The number of each specialisation constant that has one, by its id.
     numbers: HashMap<u32, u32>,
-    types: HashSet<u32>,
+    types: Ids,
     /// The type of booleans.
     boolean: Option<u32>,
     flow: Flow,
     /// The functions as they are written.
     body: Vec<u32>,
     /// Results of instructions that were left out.
-    removed: HashSet<u32>,
+    removed: Ids,
     /// Variables that hold the number of a thread within its subgroup.
-    lanes: HashSet<u32>,
+    lanes: Ids,
     /// Whether something is left that subgroups do together.
     by_subgroups: bool,
     /// Undefined values by their type, for the edges from [`Stubs`].
@@ -68,7 +68,8 @@ struct Specialised<'a> {
 
 impl<'a> Specialised<'a> {
     fn new(bound: u32, constants: &'a [(u32, u32)]) -> Self {
-        let (numbers, types, boolean, body, removed, lanes, by_subgroups, undefined) = Default::default();
+        let (numbers, boolean, body, by_subgroups, undefined) = Default::default();
+        let [types, removed, lanes] = [(); 3].map(|()| Ids::new(bound));
         let flow = Flow::new(bound);
         Self { constants, numbers, types, boolean, flow, body, removed, lanes, by_subgroups, undefined, bound }
     }
@@ -76,9 +77,9 @@ impl<'a> Specialised<'a> {
     /// What is left of a declaration once the functions are written: neither names of what is gone nor, where subgroups do nothing,
     /// what only devices with such subgroups understand.
     fn left_of<'b>(&self, (opcode, words): &'b (u16, Vec<u32>)) -> Option<(u16, Cow<'b, [u32]>)> {
-        let of_subgroups = |id| !self.by_subgroups && self.lanes.contains(id);
+        let of_subgroups = |&id: &u32| !self.by_subgroups && self.lanes.contains(id);
         let stays = match (*opcode, &words[..]) {
-            (op::NAME | op::DECORATE, [id, ..]) => !self.removed.contains(id) && !of_subgroups(id),
+            (op::NAME | op::DECORATE, [id, ..]) => !self.removed.contains(*id) && !of_subgroups(id),
             (op::VARIABLE, [_, id, ..]) => !of_subgroups(id),
             (op::CAPABILITY, [GROUP_NON_UNIFORM..=GROUP_NON_UNIFORM_QUAD]) => self.by_subgroups,
             _ => true,
@@ -97,8 +98,8 @@ impl<'a> Specialised<'a> {
                 self.numbers.insert(id, number);
                 return None;
             }
-            (op::DECORATE, &[id, BUILT_IN, SUBGROUP_LOCAL_INVOCATION_ID]) => _ = self.lanes.insert(id),
-            (op::TYPE_RAY_QUERY | op::TYPE_ACCELERATION_STRUCTURE, &[id]) => _ = self.types.insert(id),
+            (op::DECORATE, &[id, BUILT_IN, SUBGROUP_LOCAL_INVOCATION_ID]) => self.lanes.insert(id),
+            (op::TYPE_RAY_QUERY | op::TYPE_ACCELERATION_STRUCTURE, &[id]) => self.types.insert(id),
             (op::TYPE_VOID..=op::TYPE_FUNCTION, &[id, ref of @ ..]) => {
                 self.types.insert(id);
                 if *opcode == op::TYPE_BOOL {
@@ -113,7 +114,7 @@ impl<'a> Specialised<'a> {
             (op::CONSTANT | op::SPEC_CONSTANT, &[kind, id, default]) => {
                 return Some(self.number(kind, id, self.chosen(id).unwrap_or(default)));
             }
-            (op::SPEC_CONSTANT_OP, &[kind, id, operation, ref operands @ ..]) if self.flow.scalars.contains(&kind) => {
+            (op::SPEC_CONSTANT_OP, &[kind, id, operation, ref operands @ ..]) if self.flow.scalars.contains(kind) => {
                 if let Value::Constant(value) = self.flow.evaluate(operation as u16, operands) {
                     let is_truth = self.boolean == Some(kind);
                     return Some(if is_truth { self.truth(kind, id, value) } else { self.number(kind, id, value) });
@@ -131,7 +132,7 @@ impl<'a> Specialised<'a> {
     }
 
     fn number(&mut self, kind: u32, id: u32, value: u32) -> (u16, Vec<u32>) {
-        if self.flow.scalars.contains(&kind) {
+        if self.flow.scalars.contains(kind) {
             self.flow.set(id, Value::Constant(value));
         }
         (op::CONSTANT, vec![kind, id, value])
@@ -147,13 +148,13 @@ impl<'a> Specialised<'a> {
         let first = function.iter().position(|i| i.opcode == op::LABEL).unwrap_or(function.len());
         let (head, rest) = function.split_at(first);
         let (blocks, end) = rest.split_at(rest.len().saturating_sub(1));
-        let blocks = Blocks::new(blocks);
+        let blocks = flow::blocks(blocks);
         self.flow.propagate(&blocks);
         let stubs = self.stubs(&blocks);
         head.iter().for_each(|instruction| instruction.write(&mut self.body));
-        for block in &blocks.all {
-            if self.flow.reached.contains(&label(block)) {
-                self.reached(block, &blocks, &stubs);
+        for block in &blocks {
+            if self.flow.reached.contains(label(block)) {
+                self.reached(block, &stubs);
             } else {
                 self.unreached(block, &stubs);
             }
@@ -161,10 +162,13 @@ impl<'a> Specialised<'a> {
         end.iter().for_each(|instruction| instruction.write(&mut self.body));
     }
 
-    fn stubs(&mut self, blocks: &Blocks) -> Stubs {
+    fn stubs(&mut self, blocks: &[&[Instruction]]) -> Stubs {
         let mut stubs = Stubs::new();
-        for block in blocks.all.iter().filter(|block| self.flow.reached.contains(&label(block))) {
-            let decided = self.flow.decided(block, blocks);
+        for block in blocks {
+            if !self.flow.reached.contains(label(block)) {
+                continue;
+            }
+            let decided = self.flow.decided(block);
             let keeps = decided.is_none() || self.flow.is_left_early(block);
             for Instruction { opcode, words } in block.iter() {
                 match (*opcode, *words) {
@@ -179,19 +183,19 @@ impl<'a> Specialised<'a> {
             if let Some([_, never]) = decided.filter(|_| keeps) {
                 stubs.entry(never).or_insert(None);
                 // So that its phis keep what comes from here.
-                self.flow.edges.insert((label(block), never));
+                self.flow.add_edge(label(block), never);
             }
         }
-        stubs.retain(|label, _| !self.flow.reached.contains(label));
+        stubs.retain(|label, _| !self.flow.reached.contains(*label));
         stubs
     }
 
-    fn reached(&mut self, block: &[Instruction], blocks: &Blocks, stubs: &Stubs) {
-        let decided = self.flow.decided(block, blocks).filter(|_| !self.flow.is_left_early(block));
+    fn reached(&mut self, block: &[Instruction], stubs: &Stubs) {
+        let decided = self.flow.decided(block).filter(|_| !self.flow.is_left_early(block));
         for instruction in block {
             self.by_subgroups |= match instruction.opcode {
                 op::GROUP_NON_UNIFORM_ELECT..=op::GROUP_NON_UNIFORM_QUAD_SWAP => true,
-                op::LOAD => self.lanes.contains(&instruction.words[2]),
+                op::LOAD => self.lanes.contains(instruction.words[2]),
                 _ => false,
             };
             match (instruction.opcode, decided) {
@@ -207,9 +211,9 @@ impl<'a> Specialised<'a> {
 
     fn unreached(&mut self, block: &[Instruction], stubs: &Stubs) {
         // An instruction has a result if its first operand is a type.
-        let results =
-            block.iter().filter(|i| i.words.len() > 1 && self.types.contains(&i.words[0])).map(|i| i.words[1]);
-        self.removed.extend(results);
+        for Instruction { words, .. } in block.iter().filter(|i| i.words.len() > 1 && self.types.contains(i.words[0])) {
+            self.removed.insert(words[1]);
+        }
         let Some(header) = stubs.get(&label(block)) else {
             self.removed.insert(label(block));
             return;
@@ -223,7 +227,7 @@ impl<'a> Specialised<'a> {
 
     /// Writes a phi of block `here` with the edges that are left.
     fn phi(&mut self, words: &[u32], here: u32, stubs: &Stubs) {
-        let ways = words[2..].chunks_exact(2).filter(|way| self.flow.edges.contains(&(way[1], here)));
+        let ways = words[2..].chunks_exact(2).filter(|way| self.flow.has_edge(way[1], here));
         let mut left: Vec<u32> = words[..2].iter().chain(ways.flatten()).copied().collect();
         if let Some((stub, _)) = stubs.iter().find(|(_, header)| **header == Some(here)) {
             let bound = &mut self.bound;
