@@ -5,6 +5,7 @@ mod animation;
 mod command;
 mod files;
 mod gltf;
+mod gltf_allowed;
 mod gltf_bad;
 #[path = "../support/gltf.rs"]
 mod gltf_file;

@@ -83,13 +83,16 @@ pub fn read(asset: &Asset, primitive: &Json, place: &str) -> Result<Option<Primi
     let mut reader = Reader { asset, primitive, place, vertices, used: None };
     let indices = reader.used_triangles()?;
     let uv_up = |uvs: Vec<[f32; 2]>| uvs.into_iter().map(|[u, v]| [u, 1.0 - v]).collect();
+    let normals = reader.numbers(Semantic::Normals)?;
+    // glTF 2.0, section 3.7.2.1: tangents without normals are ignored.
+    let tangents = if normals.is_empty() { Vec::new() } else { reader.numbers(Semantic::Tangents)? };
     let mut mesh = Mesh {
         positions: reader.numbers(Semantic::Positions)?,
-        normals: reader.numbers(Semantic::Normals)?,
+        normals,
         uvs: uv_up(reader.numbers(Semantic::TexCoords(0))?),
         uvs2: uv_up(reader.numbers(Semantic::TexCoords(1))?),
         colors: reader.colors()?,
-        tangents: reader.numbers(Semantic::Tangents)?,
+        tangents,
         indices,
     };
     let joints = reader.joints()?;

@@ -1,0 +1,46 @@
+//! Tests what glTF allows and few files do: numbers and lists in unusual forms, transforms and attributes that say nothing.
+use crate::gltf_file::{data, floats, triangle};
+use serde_json::{Value, json};
+use tallow::layout::ATTRIBUTE_TANGENTS;
+use tallow::scene::{Loaded, Scene};
+
+fn load_text(text: &str) -> Loaded {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    std::fs::write(&path, text).unwrap();
+    Scene::load(&path).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn load(json: &Value) -> Loaded {
+    load_text(&json.to_string())
+}
+
+/// Adds an accessor of floats for the three vertices; returns its number.
+fn add_floats(json: &mut Value, kind: &str, numbers: &[f32]) -> usize {
+    let push = |json: &mut Value, key: &str, value: Value| {
+        let list = json[key].as_array_mut().unwrap();
+        list.push(value);
+        list.len() - 1
+    };
+    let bytes = floats(numbers);
+    let buffer = push(json, "buffers", json!({ "byteLength": bytes.len(), "uri": data(&bytes) }));
+    let view = push(json, "bufferViews", json!({ "buffer": buffer, "byteLength": bytes.len() }));
+    push(json, "accessors", json!({ "bufferView": view, "componentType": 5126, "count": 3, "type": kind }))
+}
+
+#[test]
+fn tangents_count_beside_normals_alone() {
+    let mut json = triangle();
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbImage::new(1, 1).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    json["images"] = json!([{ "uri": data(&png.into_inner()) }]);
+    json["textures"] = json!([{ "source": 0 }]);
+    json["materials"][0]["normalTexture"] = json!({ "index": 0 });
+    let tangents = add_floats(&mut json, "VEC4", &[0.0, 1.0, 0.0, 1.0].repeat(3));
+    let normals = add_floats(&mut json, "VEC3", &[0.0, 0.0, 1.0].repeat(3));
+    let kept = |json: &Value| load(json).shading.iter().any(|s| s.attributes & ATTRIBUTE_TANGENTS != 0);
+    json["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = json!(tangents);
+    assert!(!kept(&json));
+    json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(normals);
+    assert!(kept(&json));
+}
