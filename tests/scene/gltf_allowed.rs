@@ -44,3 +44,20 @@ fn tangents_count_beside_normals_alone() {
     json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(normals);
     assert!(kept(&json));
 }
+
+#[test]
+fn json_is_read_in_all_its_forms() {
+    let mut json = triangle();
+    let (text, expected) = (json.to_string(), load(&json).triangles.clone());
+    for (from, to) in [
+        ("\"count\":3", "\"count\":3.0"),
+        ("\"byteLength\":36", "\"byteLength\":3.6e1"),
+        ("\"componentType\":5126", "\"componentType\":5126.0"),
+        ("\"scene\":0", "\"scene\":0,\"scene\":0"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        assert_eq!(load_text(&text.replace(from, to)).triangles, expected, "{to}");
+    }
+    json["scenes"].as_array_mut().unwrap().push(json!({ "name": "without nodes" }));
+    assert_eq!(load(&json).triangles, expected);
+}

@@ -112,25 +112,43 @@ impl<'a> Asset<'a> {
 }
 
 fn parse(path: &Path, json: &[u8]) -> Result<Root> {
-    let parsed = serde_json::from_slice(json).or_else(|e| match e.to_string().starts_with("missing field `node`") {
-        true => without_pointers(json).unwrap_or(Err(e)),
-        false => Err(e),
-    });
-    parsed.map_err(|e| {
+    serde_json::from_slice(json).or_else(|e| parse_leniently(json).ok_or(e)).map_err(|e| {
         let (text, place) = (e.to_string(), format!("line {}, column {}", e.line(), e.column()));
         let what = text.rsplit_once(" at line ").map_or(text.as_str(), |(what, _)| what);
         Error::input_at(path, place, format!("is no glTF: {}", one_line(what)))
     })
 }
 
-/// The file without the animation channels that move no node. Extensions have them, and the parser insists on nodes.
-fn without_pointers(json: &[u8]) -> Option<serde_json::Result<Root>> {
+/// The file without what glTF allows and the parser refuses: keys that are repeated, integers that are written as `25.0` or
+/// `1e2`, scenes without nodes, and animation channels that move no node, which extensions have.
+fn parse_leniently(json: &[u8]) -> Option<Root> {
+    fn list<'a>(value: &'a mut Value, key: &str) -> impl Iterator<Item = &'a mut Value> {
+        value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
+    }
     let mut root: Value = serde_json::from_slice(json).ok()?;
-    for animation in root.get_mut("animations")?.as_array_mut()? {
-        let channels = animation.get_mut("channels")?.as_array_mut()?;
+    make_integers(&mut root);
+    for scene in list(&mut root, "scenes").filter_map(Value::as_object_mut) {
+        scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+    }
+    for channels in list(&mut root, "animations").filter_map(|animation| animation.get_mut("channels")?.as_array_mut())
+    {
         channels.retain(|channel| channel.pointer("/target/node").is_some());
     }
-    Some(serde_json::from_value(root))
+    serde_json::from_value(root).ok()
+}
+
+/// Turns whole numbers from 0 to 2^53 into integers, which are read as either kind of number.
+fn make_integers(value: &mut Value) {
+    const LARGEST: f64 = 9_007_199_254_740_992.0;
+    match value {
+        Value::Array(list) => list.iter_mut().for_each(make_integers),
+        Value::Object(object) => object.values_mut().for_each(make_integers),
+        Value::Number(number) => {
+            let whole = number.as_f64().filter(|v| number.is_f64() && v.fract() == 0.0 && (0.0..=LARGEST).contains(v));
+            *value = whole.map_or_else(|| value.take(), |v| (v as u64).into());
+        }
+        _ => {}
+    }
 }
 
 /// A name of the file as messages and reports show it: without line ends and other control characters, and not too long.
