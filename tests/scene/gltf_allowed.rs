@@ -61,3 +61,30 @@ fn json_is_read_in_all_its_forms() {
     json["scenes"].as_array_mut().unwrap().push(json!({ "name": "without nodes" }));
     assert_eq!(load(&json).triangles, expected);
 }
+
+#[test]
+fn a_mesh_that_a_scale_flattens_is_seen() {
+    let mut json = triangle();
+    let corners = add_floats(&mut json, "VEC3", &[0.0, 0.0, 5.0, 1.0, 0.0, 6.0, 0.0, 1.0, 7.0]);
+    let normals = add_floats(&mut json, "VEC3", &[1.0, 0.0, 0.0].repeat(3));
+    json["meshes"][0]["primitives"][0]["attributes"] = json!({ "POSITION": corners, "NORMAL": normals });
+    json["nodes"][0] = json!({ "mesh": 0, "scale": [1, 2, 0], "translation": [0, 0, 3] });
+    let scene = load(&json);
+    let [t] = &scene.triangles[..] else { panic!("{:?}", scene.triangles) };
+    let mut corners = [t.v0, t.v1, t.v2];
+    corners.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    assert_eq!(corners, [[0.0, 0.0, 3.0], [0.0, 2.0, 3.0], [1.0, 0.0, 3.0]]);
+    let flat = scene.shading.iter().all(|s| s.normal == [u32::MAX; 3]);
+    assert!(flat && !scene.warnings.iter().any(|w| w.contains("scale is 0")), "{:?}", scene.warnings);
+    json["nodes"][0]["scale"] = json!([0, 2, 0]);
+    assert!(load(&json).warnings.contains(&"1 meshes whose scale is 0 are not rendered".to_owned()));
+}
+
+#[test]
+fn instancing_that_lists_nothing_leaves_the_mesh_as_it_is() {
+    let mut json = triangle();
+    json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": {} } });
+    let scene = load(&json);
+    assert_eq!(scene.triangles.len(), 1);
+    assert!(!scene.warnings.iter().any(|w| w.contains("scale is 0")), "{:?}", scene.warnings);
+}

@@ -15,13 +15,14 @@ struct Instancing {
     attributes: BTreeMap<String, usize>,
 }
 
-/// The transforms that a node's extensions list; `None` where the node shows its mesh once.
+/// The transforms that a node's extensions list; `None` where they list none, and the node shows its mesh once.
 ///
 /// # Errors
 /// [`crate::error::Error::Input`] for lists of different lengths or types.
 pub fn read(asset: &Asset, all: Option<&Map<String, Value>>, place: &str) -> Result<Option<Vec<DAffine3>>> {
     let found: Option<Instancing> = extension::read(asset, all, "EXT_mesh_gpu_instancing", place)?;
-    found.map(|found| instances(asset, &found.attributes, place)).transpose()
+    let all = found.map(|found| instances(asset, &found.attributes, place)).transpose()?;
+    Ok(all.filter(|all| !all.is_empty()))
 }
 
 fn instances(asset: &Asset, attributes: &BTreeMap<String, usize>, place: &str) -> Result<Vec<DAffine3>> {

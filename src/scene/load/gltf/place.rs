@@ -13,7 +13,7 @@ use super::tangent;
 use crate::error::Result;
 use crate::memory;
 use crate::scene::description::{Description, InstanceTable, MaterialTable, Mesh, MeshTable, Transform};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -226,7 +226,7 @@ impl<'a> Placer<'a> {
         Ok(())
     }
 
-    /// Where a node shows its mesh: once, or as often as `EXT_mesh_gpu_instancing` says. What is flattened is left out.
+    /// Where a node shows its mesh: once, or as often as `EXT_mesh_gpu_instancing` says. What has no extent is left out.
     fn copies(&mut self, node: usize) -> Result<Vec<Copy>> {
         let all = self.asset.root.nodes[node].extensions.as_ref().map(|e| &e.others);
         let place = format!("node {node}");
@@ -234,8 +234,11 @@ impl<'a> Placer<'a> {
         memory::need(self.asset.path.display(), BYTES_OF_INSTANCE * several.as_ref().map_or(0, Vec::len) as u64)?;
         let owns = several.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
         let mut copies: Vec<_> = owns.into_iter().map(|own| Copy { node, own }).collect();
-        // What moves may be flat at rest alone.
-        copies.retain(|copy| self.moved.nodes[node] || Transform(self.world(copy)).has_inverse());
+        copies.retain(|copy| {
+            let world = Transform(self.world(copy));
+            // What moves may be flat at rest alone; vertices that move are not baked.
+            self.moved.nodes[node] || world.has_inverse() || !self.moved.weights[node] && spans_a_plane(&world.0)
+        });
         self.flat += usize::from(copies.is_empty());
         Ok(copies)
     }
@@ -244,29 +247,56 @@ impl<'a> Placer<'a> {
         self.worlds[copy.node] * copy.own
     }
 
-    /// Adds a mesh at every one of `copies`: as instances where there are several, or where its node moves.
+    /// Adds a mesh at every one of `copies`: baked where it is flattened, as instances where there are several, or where its node
+    /// moves.
     fn add(&mut self, name: &str, mesh: Mesh, material: Option<usize>, copies: &[Copy]) -> Result<()> {
+        let stays_whole = |copy: &&Copy| self.moved.nodes[copy.node] || Transform(self.world(copy)).has_inverse();
+        let (copies, flat): (Vec<Copy>, Vec<Copy>) = copies.iter().partition(stays_whole);
+        for copy in flat {
+            self.add_flattened(name, &mesh, material, &copy)?;
+        }
         if copies.is_empty() {
             return Ok(());
         }
         memory::need(self.asset.path.display(), BYTES_OF_INSTANCE * copies.len() as u64)?;
         let at = self.tables.len();
         self.add_fixed(name, mesh, material)?;
-        if let [only] = copies
+        if let [only] = copies[..]
             && !self.moved.nodes[only.node]
         {
-            self.tables[at].transform = Transform(self.world(only));
+            self.tables[at].transform = Transform(self.world(&only));
             return Ok(());
         }
         let mesh = self.tables[at].name.clone().unwrap_or_default();
         for copy in copies {
-            let (number, Copy { node, own }) = (self.instances.len(), *copy);
+            let (number, Copy { node, own }) = (self.instances.len(), copy);
             self.found.instances.extend(self.moved.nodes[node].then_some(MovedInstance { number, node, own }));
-            let world = Transform(self.world(copy));
+            let world = Transform(self.world(&copy));
             let transform = if world.has_inverse() { world } else { speck(&world.0) };
             self.instances.push(InstanceTable { mesh: mesh.clone(), transform, ..InstanceTable::default() });
         }
         Ok(())
+    }
+
+    /// Adds the facets of a mesh that keep an area when it is moved to a plane. Normals have no direction there.
+    fn add_flattened(&mut self, name: &str, mesh: &Mesh, material: Option<usize>, copy: &Copy) -> Result<()> {
+        let bytes = BYTES_OF_BENT_VERTEX * mesh.positions.len() + size_of::<u32>() * mesh.indices.len();
+        memory::need(self.asset.path.display(), bytes as u64)?;
+        let world = self.world(copy);
+        let place = |p: &[f32; 3]| world.transform_point3(DVec3::from(p.map(f64::from))).as_vec3();
+        let positions: Vec<_> = mesh.positions.iter().map(place).collect();
+        let area = |t: &&[u32]| {
+            let [a, b, c] = [0, 1, 2].map(|corner| positions[t[corner] as usize]);
+            (b - a).cross(c - a) != Vec3::ZERO
+        };
+        let indices: Vec<_> = mesh.indices.chunks_exact(3).filter(area).flatten().copied().collect();
+        if indices.is_empty() {
+            self.flat += 1;
+            return Ok(());
+        }
+        let positions = positions.into_iter().map(|p| p.to_array()).collect();
+        let plane = Mesh { positions, indices, normals: Vec::new(), tangents: Vec::new(), ..mesh.clone() };
+        self.add_fixed(name, plane, material)
     }
 
     /// Adds a mesh whose vertices are where they are in the world.
@@ -315,6 +345,15 @@ impl Names {
         self.0.insert(free.clone(), 1);
         free
     }
+}
+
+/// Whether a transform leaves meshes two directions at least. The bound is the square of the scale below which
+/// [`Transform::has_inverse`] sees none.
+fn spans_a_plane(affine: &DAffine3) -> bool {
+    const LEAST: f64 = 1e-36;
+    let m = affine.matrix3;
+    let areas = [m.x_axis.cross(m.y_axis), m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis)];
+    affine.is_finite() && areas.iter().any(|area| area.length() >= LEAST)
 }
 
 /// Stands in at rest for what is flat then, and moves: so small that it is not seen.
