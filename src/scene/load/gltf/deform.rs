@@ -55,16 +55,21 @@ pub fn deformed(primitive: &Primitive, weights: &[f32], matrices: Option<&[DAffi
         add(&mut mesh, target, weight);
     }
     if let Some(matrices) = matrices.filter(|_| !primitive.joints.is_empty()) {
-        for vertex in 0..mesh.positions.len() {
+        let mut mirrored = vec![false; mesh.positions.len()];
+        for (vertex, mirrored) in mirrored.iter_mut().enumerate() {
             let matrix = blended(primitive, vertex, matrices);
+            *mirrored = matrix.matrix3.determinant() < 0.0;
             mesh.positions[vertex] = matrix.transform_point3(double(mesh.positions[vertex])).as_vec3().to_array();
             if let Some(normal) = mesh.normals.get_mut(vertex) {
                 *normal = turned_normal(&matrix, double(*normal)).as_vec3().to_array();
             }
-            if let Some([x, y, z, _]) = mesh.tangents.get_mut(vertex) {
+            if let Some([x, y, z, sign]) = mesh.tangents.get_mut(vertex) {
                 [*x, *y, *z] = matrix.transform_vector3(double([*x, *y, *z])).as_vec3().to_array();
+                *sign = if *mirrored { -*sign } else { *sign };
             }
         }
+        // glTF 2.0, section 3.7.4: what is mirrored winds the other way. Later poses keep the triangles of the one at rest.
+        mesh.indices.chunks_exact_mut(3).filter(|t| mirrored[t[0] as usize]).for_each(|t| t.swap(1, 2));
     }
     mesh
 }
@@ -106,4 +111,28 @@ fn turned_normal(matrix: &DAffine3, normal: DVec3) -> DVec3 {
 
 fn double(v: [f32; 3]) -> DVec3 {
     Vec3::from(v).as_dvec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_joints_mirror_keeps_its_outside() {
+        let mesh = Mesh {
+            positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            normals: vec![[0.0, 0.0, 1.0]; 3],
+            tangents: vec![[1.0, 0.0, 0.0, 1.0]; 3],
+            indices: vec![0, 1, 2],
+            ..Mesh::default()
+        };
+        let joints = vec![Influence { joints: vec![[0.0; 4]; 3], weights: vec![[1.0, 0.0, 0.0, 0.0]; 3] }];
+        let primitive = Primitive { mesh, material: None, targets: Vec::new(), joints };
+        for (x, indices, tangent) in [(1.0, [0, 1, 2], [1.0, 0.0, 0.0, 1.0]), (-1.0, [0, 2, 1], [-1.0, 0.0, 0.0, -1.0])]
+        {
+            let moved = deformed(&primitive, &[], Some(&[DAffine3::from_scale(DVec3::new(x, 1.0, 1.0))]));
+            assert_eq!((moved.indices.as_slice(), moved.tangents[0]), (&indices[..], tangent), "scaled by {x}");
+            assert_eq!(moved.normals[0], [0.0, 0.0, 1.0], "which the triangle faces");
+        }
+    }
 }
