@@ -13,6 +13,12 @@ Slopes slopes_of(vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     return Slopes((d2.y * e1 - d1.y * e2) / det, (d1.x * e2 - d2.x * e1) / det, det != 0.0);
 }
 
+// The same of the coordinates at which a picture is read, but for positive factors.
+Slopes slopes_in(Texture image, Slopes s) {
+    float side = image.scale.x * image.scale.y < image.shear.x * image.shear.y ? -1.0 : 1.0;
+    return Slopes(side * (image.scale.y * s.u - image.shear.y * s.v), side * (image.scale.x * s.v - image.shear.x * s.u), s.known);
+}
+
 // A direction of tangent space, around the smooth normal; not normalised.
 vec3 from_tangent_space(Surface s, vec3 m, Slopes slopes) {
     bool given = FX_TANGENTS && s.tangent.w != 0.0;
@@ -37,7 +43,7 @@ vec3 perturbed_coat(Surface s, Slopes slopes) {
     if (image == NONE || !(slopes.known || (FX_TANGENTS && s.tangent.w != 0.0))) return s.smooth_normal;
     vec3 m = 2.0 * texture_sample(image, uv_of(s, image), false).xyz - 1.0;
     m.xy *= Material_clearcoat_normal_scale(materials, s.material);
-    return normal_or_smooth(s, from_tangent_space(s, m, slopes));
+    return normal_or_smooth(s, from_tangent_space(s, m, slopes_in(Texture_load(textures, image), slopes)));
 }
 
 // The normal perturbed by a height map (Blinn 1978) or a tangent-space normal map.
@@ -65,7 +71,7 @@ vec3 perturbed_normal(Surface s, Slopes slopes) {
     if (mapped) {
         vec3 m = 2.0 * value - 1.0;
         m.xy *= Material_normal_scale(materials, s.material);
-        n = from_tangent_space(s, m, slopes);
+        n = from_tangent_space(s, m, slopes_in(map, slopes));
     } else {
         float height = Material_bump_scale(materials, s.material);
         vec3 pu = dpdu + s.normal * (height * (rise.x / texel.x) - dot(s.normal, dpdu));

@@ -1,6 +1,6 @@
 //! Twin of `glsl/shared/surface.glsl` and `glsl/shared/normal_map.glsl`.
 use crate::layout::{
-    BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_NORMAL_MAP, MATERIAL_TWO_SIDED, MATERIAL_UNLIT, Material, NONE,
+    BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_NORMAL_MAP, MATERIAL_TWO_SIDED, MATERIAL_UNLIT, Material, NONE, Texture,
 };
 use crate::math::octahedral::{octahedral_decode, octahedral_vector};
 use crate::math::warp::basis_from_normal;
@@ -88,9 +88,17 @@ fn slopes_of(e1: Vec3, e2: Vec3, d1: Vec2, d2: Vec2) -> Slopes {
     (det != 0.0).then(|| [(d2.y * e1 - d1.y * e2) / det, (d1.x * e2 - d2.x * e1) / det])
 }
 
+/// The same of the coordinates at which a picture is read, but for positive factors.
+fn slopes_in(image: &Texture, [u, v]: [Vec3; 2]) -> [Vec3; 2] {
+    let (scale, shear) = (Vec2::from(image.scale), Vec2::from(image.shear));
+    let side = if scale.x * scale.y < shear.x * shear.y { -1.0 } else { 1.0 };
+    [side * (scale.y * u - shear.y * v), side * (scale.x * v - shear.x * u)]
+}
+
 /// The smooth normal perturbed by a normal map, not normalised; `None` where nothing says how it lies on the surface.
 fn normal_from_map(scene: &Scene, s: &Surface, image: u32, scale: f32, slopes: Slopes) -> Option<Vec3> {
     let given = s.tangent.w != 0.0;
+    let slopes = slopes.map(|slopes| slopes_in(&scene.textures[image as usize], slopes));
     let along = if given { s.tangent.truncate() } else { slopes?[0] };
     let m = (2.0 * texture_sample(scene, image, uv_of(scene, s, image)).truncate() - 1.0) * vec3(scale, scale, 1.0);
     let n = s.smooth_normal;

@@ -18,6 +18,7 @@ mod path;
 mod picture;
 #[path = "../support/poses.rs"]
 mod poses;
+mod relief;
 mod reproject;
 mod shown;
 mod sphere;

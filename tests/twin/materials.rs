@@ -20,7 +20,7 @@ type Plant = (&'static str, fn(&mut Loaded));
 const SIDE: u32 = 8;
 
 /// A wavy square of [-1, 1] in x and y with everything that a vertex may have.
-fn patch() -> Mesh {
+pub fn patch() -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..=SIDE * SIDE + 2 * SIDE {
         let [u, v] = [i % (SIDE + 1), i / (SIDE + 1)].map(|k| k as f32 / SIDE as f32);
@@ -43,7 +43,7 @@ fn bitmap(name: &str, texel: impl Fn(u32, u32) -> [u8; 4]) -> Bitmap {
     Bitmap { name: name.into(), width: 16, height: 16, rgba }
 }
 
-fn texture(name: &str) -> Option<TextureTable> {
+pub fn texture(name: &str) -> Option<TextureTable> {
     Some(name.into())
 }
 
@@ -197,14 +197,14 @@ fn materials_of_gltf_agree_with_their_twins() {
 }
 
 /// The surface that a ray along -z at (x, y) meets, of a scene without perspective.
-fn surface(scene: &Scene, x: f32, y: f32) -> Surface {
+pub fn surface(scene: &Scene, x: f32, y: f32) -> Surface {
     let hit = traverse(scene, vec3(x, y, 5.0), Vec3::NEG_Z, 100.0, false, 0);
     assert!(hit.any(), "nothing at {x}, {y}");
     surface_at(scene, &hit)
 }
 
 /// One patch of one material in world space.
-fn one(material: MaterialTable, mesh: Mesh, transform: Transform, flip_normals: bool) -> Scene {
+pub fn one(material: MaterialTable, mesh: Mesh, transform: Transform, flip_normals: bool) -> Scene {
     let whole = described();
     let name = material.name.clone();
     let table = MeshTable { material: Some(name), data: Some(mesh), transform, flip_normals, ..MeshTable::default() };

@@ -55,6 +55,12 @@ impl From<&TextureTable> for Mapping {
 }
 
 impl Mapping {
+    /// Where coordinates read the picture.
+    pub fn applied(&self, [u, v]: [f32; 2]) -> [f32; 2] {
+        let at = |i: usize, own: f32, other: f32| own * self.scale[i] + other * self.shear[i] + self.offset[i];
+        [at(0, u, v), at(1, v, u)]
+    }
+
     /// Distinguishes mappings that are not equal.
     pub fn bits(self) -> [u32; 7] {
         let [[a, b], [c, d], [e, f]] = [self.scale, self.shear, self.offset].map(|v| v.map(f32::to_bits));
@@ -85,9 +91,8 @@ mod tests {
 
     /// Where the mapping reads, with v down before and after.
     fn read(t: &TextureTable, [u, w]: [f32; 2]) -> [f32; 2] {
-        let (m, v) = (Mapping::from(t), 1.0 - w);
-        let at = |i: usize, own: f32, other: f32| own * m.scale[i] + other * m.shear[i] + m.offset[i];
-        [at(0, u, v), 1.0 - at(1, v, u)]
+        let [x, y] = Mapping::from(t).applied([u, 1.0 - w]);
+        [x, 1.0 - y]
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::uri::{self, Target};
 use crate::error::Result;
 use crate::image::{contained, picture};
 use crate::scene::description::{Bitmap, TextureFilter, TextureTable, Wrap};
+use crate::scene::load::mapping::Mapping;
 use gltf_json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf_json::validation::Checked;
 use gltf_json::{Image, Texture};
@@ -118,10 +119,12 @@ impl Pictures {
     }
 }
 
-/// The set of texture coordinates of a reference: an extension may name another.
-pub fn set_of(set: u32, extensions: Option<&Map<String, Value>>) -> u32 {
-    let other = extensions.and_then(|all| all.get("KHR_texture_transform")?.get("texCoord")?.as_u64());
-    other.map_or(set, |other| other as u32)
+/// How a reference that names a set of texture coordinates reads them: an extension may name another, and transform them.
+pub fn coordinates_of(set: u32, extensions: Option<&Map<String, Value>>) -> Mapping {
+    let named = extensions.and_then(|all| TextureTransform::deserialize(all.get("KHR_texture_transform")?).ok());
+    let TextureTransform { offset, rotation, scale, tex_coord } = named.unwrap_or_default();
+    let uv = u32::from(tex_coord.unwrap_or(set) == 1);
+    Mapping::from(&TextureTable { uv, offset, rotate: rotation.to_degrees(), scale, ..TextureTable::default() })
 }
 
 /// How a sampler repeats a picture and fills the space between texels. Of the filters that shrink pictures only those without

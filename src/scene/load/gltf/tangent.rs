@@ -1,9 +1,10 @@
 //! Tangents of primitives that have none, as glTF 2.0, section 3.7.2.1, asks for: MikkTSpace's, with the texture coordinates of the
 //! normal map.
 use super::asset::Asset;
-use super::picture::set_of;
+use super::picture::coordinates_of;
 use super::primitive::{self, Influence, Primitive, Target};
 use crate::scene::description::Mesh;
+use crate::scene::load::mapping::Mapping;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use gltf_json::mesh::Primitive as Json;
 use std::collections::HashMap;
@@ -17,31 +18,32 @@ pub fn bytes(asset: &Asset, primitive: &Json) -> u64 {
     if made { primitive::corners(asset, primitive).saturating_mul(BYTES_OF_CORNER) } else { 0 }
 }
 
-/// The set of coordinates that a material's normal map reads, or else that of its clear coat's; `None` without either.
-fn coordinates(asset: &Asset, material: Option<usize>) -> Option<u32> {
+/// How a material's normal map reads coordinates, or else that of its clear coat; `None` without either.
+fn coordinates(asset: &Asset, material: Option<usize>) -> Option<Mapping> {
     let material = asset.root.materials.get(material?)?;
     if let Some(normal) = &material.normal_texture {
-        return Some(set_of(normal.tex_coord, normal.extensions.as_ref().map(|e| &e.others)));
+        return Some(coordinates_of(normal.tex_coord, normal.extensions.as_ref().map(|e| &e.others)));
     }
     let coat = material.extensions.as_ref()?.others.get("KHR_materials_clearcoat")?.get("clearcoatNormalTexture")?;
     let set = coat.get("texCoord").and_then(|set| set.as_u64()).unwrap_or(0);
-    Some(set_of(set as u32, coat.get("extensions").and_then(|e| e.as_object())))
+    Some(coordinates_of(set as u32, coat.get("extensions").and_then(|e| e.as_object())))
 }
 
 /// Gives a primitive tangents if its material reads them. A vertex whose triangles disagree about its tangent becomes several. Without normals the surface is
 /// flat, and its triangles have their tangents by themselves.
 pub fn add(asset: &Asset, primitive: &mut Primitive) {
-    if let Some(set) = coordinates(asset, primitive.material) {
-        make(primitive, set);
+    if let Some(mapping) = coordinates(asset, primitive.material) {
+        make(primitive, &mapping);
     }
 }
 
-fn make(primitive: &mut Primitive, set: u32) {
+fn make(primitive: &mut Primitive, mapping: &Mapping) {
     let mesh = &primitive.mesh;
-    let uvs = if set == 1 { &mesh.uvs2 } else { &mesh.uvs };
+    let uvs = if mapping.second { &mesh.uvs2 } else { &mesh.uvs };
     if !mesh.tangents.is_empty() || mesh.normals.is_empty() || uvs.is_empty() {
         return;
     }
+    let uvs = uvs.iter().map(|uv| mapping.applied(*uv)).collect();
     let mut surface = Surface { mesh, uvs, tangents: vec![None; mesh.indices.len()] };
     // It has no errors today, and a surface without tangents is none either.
     let made = generate_tangents(&mut surface).is_ok();
@@ -54,7 +56,8 @@ fn make(primitive: &mut Primitive, set: u32) {
 /// What the crate reads and writes.
 struct Surface<'a> {
     mesh: &'a Mesh,
-    uvs: &'a [[f32; 2]],
+    /// Where vertices read the picture.
+    uvs: Vec<[f32; 2]>,
     /// By corner.
     tangents: Vec<Option<[f32; 4]>>,
 }
@@ -161,7 +164,7 @@ mod tests {
     #[test]
     fn a_mirrored_picture_splits_the_vertices_of_its_seam() {
         let mut primitive = mirrored();
-        make(&mut primitive, 0);
+        make(&mut primitive, &Mapping::default());
         let mesh = &primitive.mesh;
         assert_eq!((mesh.positions.len(), mesh.tangents.len()), (6, 6));
         let of = |corner: usize| mesh.tangents[mesh.indices[corner] as usize];
@@ -176,6 +179,17 @@ mod tests {
     }
 
     #[test]
+    fn tangents_lead_along_the_picture_where_a_transform_turns_or_mirrors_it() {
+        let turned = Mapping { scale: [0.0; 2], shear: [-1.0, 1.0], ..Mapping::default() };
+        let flipped = Mapping { scale: [1.0, -2.0], ..Mapping::default() };
+        for (mapping, expected) in [(turned, [0.0, -1.0, 0.0, 1.0]), (flipped, [1.0, 0.0, 0.0, -1.0])] {
+            let mut primitive = mirrored();
+            make(&mut primitive, &mapping);
+            assert_eq!(primitive.mesh.tangents[primitive.mesh.indices[0] as usize], expected, "{mapping:?}");
+        }
+    }
+
+    #[test]
     fn what_has_tangents_or_needs_none_stays_as_it_is() {
         let mut given = mirrored();
         given.mesh.tangents = vec![ANY; 4];
@@ -184,11 +198,11 @@ mod tests {
         let mut without = mirrored();
         without.mesh.uvs.clear();
         let mut other_set = mirrored();
-        make(&mut other_set, 1);
+        make(&mut other_set, &Mapping { second: true, ..Mapping::default() });
         assert!(other_set.mesh.tangents.is_empty(), "it has no second set");
         for mut primitive in [given, flat, without] {
             let before = primitive.mesh.tangents.clone();
-            make(&mut primitive, 0);
+            make(&mut primitive, &Mapping::default());
             assert_eq!((primitive.mesh.tangents, primitive.mesh.positions.len()), (before, 4));
         }
     }
@@ -198,7 +212,7 @@ mod tests {
         let mut primitive = mirrored();
         primitive.mesh.uvs = vec![[0.5; 2]; 4];
         primitive.mesh.uvs[3] = [f32::NAN; 2];
-        make(&mut primitive, 0); // whatever it makes of them, all have as many of everything
+        make(&mut primitive, &Mapping::default()); // whatever it makes of them, all have as many of everything
         assert!(primitive.mesh.check().is_ok());
     }
 }
