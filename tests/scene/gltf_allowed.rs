@@ -88,3 +88,12 @@ fn instancing_that_lists_nothing_leaves_the_mesh_as_it_is() {
     assert_eq!(scene.triangles.len(), 1);
     assert!(!scene.warnings.iter().any(|w| w.contains("scale is 0")), "{:?}", scene.warnings);
 }
+
+#[test]
+fn a_file_that_shows_nothing_says_so() {
+    let mut json = triangle();
+    let said = |json: &Value| load(json).warnings.contains(&"the scene shows no surface".to_owned());
+    assert!(!said(&json));
+    json["nodes"][0].as_object_mut().unwrap().remove("mesh");
+    assert!(said(&json));
+}

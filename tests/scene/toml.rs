@@ -327,7 +327,7 @@ fn mistakes_are_one_line_with_place_and_remedy() {
 fn what_is_legal_but_odd_is_a_warning() {
     let empty = parse("").unwrap();
     assert_eq!((empty.triangles.len(), empty.nodes.len(), empty.materials.len()), (0, 1, 1));
-    assert_eq!(empty.warnings, ["the scene has no light: its image will be black"]);
+    assert_eq!(empty.warnings, ["the scene shows no surface", "the scene has no light: its image will be black"]);
     let bright = parse("[[material]]\nname = \"a\"\ncolor = 1.5").unwrap();
     assert!(bright.warnings[0].contains("outside [0, 1]: clamped"), "{:?}", bright.warnings);
     let missing = parse("[[material]]\nname = \"a\"\ncolor_texture = \"no.png\"").unwrap();

@@ -58,6 +58,9 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
         scene.environment = None;
         scene.rig.lights.retain(|l| l.kind != LIGHT_ENVIRONMENT);
     }
+    if scene.triangles.is_empty() {
+        warnings.push("the scene shows no surface".into());
+    }
     if scene.lights.is_empty() {
         warnings.push("the scene has no light: its image will be black".into());
     }
