@@ -239,14 +239,15 @@ impl<'a> SceneFile<'a> {
         })
     }
 
-    /// Looks through the camera of this name, which a glTF file holds.
+    /// Looks through the camera of this name, which a glTF file holds. The film takes its shape.
     ///
     /// # Errors
     /// [`Error::Usage`] with the names of the cameras that there are.
     pub fn look_through(&mut self, name: &str) -> Result<()> {
         if let Some(place) = self.cameras.iter().position(|camera| camera.name == name) {
             self.through = place;
-            self.description.to_mut().camera = self.cameras[place].camera.clone();
+            let (description, chosen) = (self.description.to_mut(), &self.cameras[place]);
+            (description.camera, description.film) = (chosen.camera.clone(), chosen.film.clone());
             return Ok(());
         }
         let names: Vec<_> = self.cameras.iter().map(|camera| format!("\"{}\"", camera.name)).collect();

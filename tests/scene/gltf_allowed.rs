@@ -90,6 +90,31 @@ fn instancing_that_lists_nothing_leaves_the_mesh_as_it_is() {
 }
 
 #[test]
+fn the_film_has_the_shape_of_the_camera_unless_it_is_absurd() {
+    let size = |camera: Value| {
+        let mut json = triangle();
+        json["cameras"] = json!([camera]);
+        let loaded = load(&json);
+        let odd =
+            loaded.warnings.iter().any(|line| line.contains("camera \"camera 0\"") || line.contains("camera \"eye\""));
+        ([loaded.settings.width, loaded.settings.height], odd)
+    };
+    let seen = |yfov: f64, ratio: f64| {
+        size(json!({ "type": "perspective", "perspective": { "yfov": yfov, "znear": 0.1, "aspectRatio": ratio } }))
+    };
+    let flat = |xmag: f64, ymag: f64| {
+        size(json!({ "type": "orthographic", "orthographic": { "xmag": xmag, "ymag": ymag, "znear": 0, "zfar": 9 } }))
+    };
+    assert_eq!(
+        [seen(0.7, 1.5), seen(0.7, 0.5), seen(0.7, 1e9)],
+        [([768, 512], false), ([256, 512], false), ([512; 2], false)]
+    );
+    assert_eq!([flat(3.0, 1.0), flat(-1.0, 2.0)], [([1536, 512], false), ([256, 512], false)]);
+    assert_eq!([seen(0.0, 2.0), seen(3.2, 2.0), flat(1.0, 0.0)].map(|(_, odd)| odd), [true; 3]);
+    assert!(size(json!({ "type": "fisheye" })).1);
+}
+
+#[test]
 fn a_file_that_shows_nothing_says_so() {
     let mut json = triangle();
     let said = |json: &Value| load(json).warnings.contains(&"the scene shows no surface".to_owned());

@@ -78,7 +78,7 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Key
             moved_lights.extend(moved.nodes[node].then(|| MovedLight { number, node, table: table.clone() }));
             model.description.light.push(table);
         }
-        model.cameras.extend(camera::of_node(&asset, node, &worlds[node]));
+        model.cameras.extend(camera::of_node(&asset, node, &worlds[node], &mut model.warnings));
     }
     let placed = placer.finish(&mut model.description, &mut model.warnings)?;
     let moves = moved.nodes;
@@ -95,7 +95,7 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Key
         model.description.environment = Some(EnvironmentTable::default());
     }
     if let Some(first) = model.cameras.first() {
-        model.description.camera = first.camera.clone();
+        (model.description.camera, model.description.film) = (first.camera.clone(), first.film.clone());
     }
     Ok(model)
 }
