@@ -90,6 +90,16 @@ fn instancing_that_lists_nothing_leaves_the_mesh_as_it_is() {
 }
 
 #[test]
+fn small_matrices_that_nothing_uses_are_passed_over() {
+    let mut json = triangle();
+    for (kind, component) in [("MAT2", 5121), ("MAT3", 5120), ("MAT3", 5123)] {
+        let accessor = json!({ "bufferView": 0, "componentType": component, "count": 1, "type": kind });
+        json["accessors"].as_array_mut().unwrap().push(accessor);
+    }
+    assert_eq!(load(&json).triangles.len(), 1);
+}
+
+#[test]
 fn the_film_has_the_shape_of_the_camera_unless_it_is_absurd() {
     let size = |camera: Value| {
         let mut json = triangle();

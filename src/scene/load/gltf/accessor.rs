@@ -50,10 +50,13 @@ impl<'a> Elements<'a> {
         let (Checked::Valid(shape), Checked::Valid(kind)) = (accessor.type_, accessor.component_type) else {
             return Err("has a type that glTF does not know".into());
         };
-        let (width, kind) = (shape.multiplicity(), kind.0);
-        if kind.size() < 4 && matches!(shape, Type::Mat2 | Type::Mat3) {
-            return Err("has small matrices of small integers, which nothing in a scene has".into());
-        }
+        let kind = kind.0;
+        // glTF 2.0, section 3.6.2.4: columns begin at multiples of four bytes. Nothing in a scene has such matrices.
+        let width = match (shape, kind.size()) {
+            (Type::Mat2, 1) => 8,
+            (Type::Mat3, 1 | 2) => 12,
+            _ => shape.multiplicity(),
+        };
         let (size, count) = (width * kind.size(), accessor.count.0);
         let stride = stride.unwrap_or(size);
         if count == 0 {
