@@ -1,5 +1,5 @@
-//! PLY files: text or binary of either byte order, also within gzip. The crate `ply-rs-bw` reads them; what their headers claim is
-//! compared with what there is before.
+//! PLY files: text or binary of either byte order, also within gzip. The crate `ply-rs-bw` reads their headers and binary rows;
+//! what headers claim is compared with what there is before.
 //!
 //! Of vertices `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`), and `red green blue alpha` are read; integers are
 //! sRGB code values, as scanners and modellers write them, and floats are linear. Faces are polygons, or strips of triangles.
@@ -15,7 +15,7 @@ use crate::scene::BYTES_OF_TRIANGLE;
 use crate::scene::description::mesh::Mesh;
 use flate2::read::GzDecoder;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{BeginList, ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult};
 use std::borrow::Cow;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -39,12 +39,13 @@ pub fn load(path: &Path, numbering: Numbering, library: &mut Library) -> Result<
     let size = file.metadata().map_or(u64::MAX, |m| m.len());
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let mut file = BufReader::with_capacity(1 << 18, file);
+    let warnings = &mut library.warnings;
     let mut read = || match packed {
         true => {
             let unpacked = &mut BufReader::with_capacity(1 << 18, GzDecoder::new(&mut file));
-            parse(path, unpacked, size.saturating_mul(DEFLATE), numbering)
+            parse(path, unpacked, size.saturating_mul(DEFLATE), numbering, warnings)
         }
-        false => parse(path, &mut file, size, numbering),
+        false => parse(path, &mut file, size, numbering, warnings),
     };
     // The memory that is missing is found before the crate is asked for anything.
     let mesh = contained(|| Ok(read())).map_err(|what| Error::input(path, what))??;
@@ -53,14 +54,29 @@ pub fn load(path: &Path, numbering: Numbering, library: &mut Library) -> Result<
     Ok(ObjFile { parts: vec![part], grey: None })
 }
 
-fn parse(path: &Path, reader: &mut dyn BufRead, size: u64, numbering: Numbering) -> Result<Mesh> {
+/// What faces may have that no vertex of theirs has, by its property, and as a warning calls it.
+const UNREAD: [(&str, &str); 2] = [("texcoord", "texture coordinates of faces"), ("red", "colours of faces")];
+
+fn parse(
+    path: &Path,
+    reader: &mut dyn BufRead,
+    size: u64,
+    numbering: Numbering,
+    warnings: &mut Vec<String>,
+) -> Result<Mesh> {
     if !reader.fill_buf().is_ok_and(|head| head.starts_with(b"ply")) {
         return Err(Error::input(path, "is no PLY file"));
     }
-    let mut file = File { reader: Reader::new(reader) };
+    let mut file = File { reader: Reader::new(reader), line: 0 };
     let about = |what| Error::input(path, what);
-    let header = Parser::<Vertex>::new().read_header(&mut file.reader).map_err(|e| about(file.damaged(&e)))?;
+    let header = Parser::<Vertex>::new().read_header(&mut file.reader).map_err(|e| about(damaged(&e)))?;
+    file.line = file.reader.line();
     check(&header, size).map_err(about)?;
+    let of_faces = |(name, _): &(&str, &str)| header.elements.get("face").is_some_and(|face| has(face, &[name]));
+    let unread: Vec<_> = UNREAD.into_iter().filter(of_faces).map(|(_, what)| what).collect();
+    if !unread.is_empty() {
+        warnings.push(format!("{}: not read: {}", path.display(), unread.join(", ")));
+    }
     let count = |name| header.elements.get(name).map_or(0, |e| e.count as u64);
     let (vertices, faces) = (count("vertex"), count("face") + count("tristrips"));
     let read = vertices * BYTES_OF_VERTEX + faces * BYTES_OF_FACE;
@@ -92,20 +108,27 @@ fn has(element: &ElementDef, names: &[&str]) -> bool {
     names.iter().all(|name| element.properties.contains_key(*name))
 }
 
+fn damaged(e: &ParseError) -> String {
+    let line = e.line().map_or_else(String::new, |line| format!(" in line {line}"));
+    format!("is damaged or ends too early{line}: save it again as PLY 1.0")
+}
+
 /// Of any reader, so that the crate's parser is compiled once.
 struct File<'a> {
     reader: Reader<&'a mut dyn BufRead>,
+    /// Number of the line that is next in a text.
+    line: usize,
 }
 
 impl File<'_> {
-    fn damaged(&self, e: &ParseError) -> String {
-        let line = e.line().map_or_else(String::new, |line| format!(" in line {line}"));
-        format!("is damaged or ends too early{line}: save it again as PLY 1.0")
-    }
-
     fn rows<E: PropertyAccess>(&mut self, element: &ElementDef, header: &Header) -> Checked<Vec<E>> {
-        let rows = Parser::new().read_payload_for_element(&mut self.reader, element, header);
-        rows.map_err(|e| self.damaged(&e))
+        match header.encoding {
+            Encoding::Ascii => text::rows(*self.reader.get_mut(), element, &mut self.line),
+            _ => {
+                let rows = Parser::new().read_payload_for_element(&mut self.reader, element, header);
+                rows.map_err(|e| damaged(&e))
+            }
+        }
     }
 
     fn mesh(&mut self, header: &Header, numbering: Numbering) -> Checked<Mesh> {
@@ -241,13 +264,13 @@ impl PropertyAccess for Face {
         Self(Vec::new())
     }
 
-    fn begin_list_int(&mut self, name: &str, _len: usize) -> BeginList<'_, i32> {
-        if is_corners(name) { BeginList::Fill(&mut self.0) } else { BeginList::UseSetter }
-    }
-
     fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
         if !is_corners(name) {
             return PropertyAccessResult::Ignored;
+        }
+        if let Property::ListInt(corners) = value {
+            self.0 = corners;
+            return PropertyAccessResult::Set;
         }
         let Some(corners) = value.to_u32_list() else { return PropertyAccessResult::UnsupportedType };
         // What no 32-bit index reaches becomes negative, which is refused.
@@ -289,6 +312,8 @@ impl PropertyAccess for Nothing {
         Self
     }
 }
+
+mod text;
 
 #[cfg(test)]
 mod tests;

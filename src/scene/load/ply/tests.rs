@@ -180,3 +180,38 @@ fn damaged_files_end_in_an_error_or_in_a_mesh() {
         }
     }
 }
+
+#[test]
+fn numbers_of_a_text_may_have_every_form_of_c() {
+    let header = "element vertex 4\nproperty float x\nproperty double y\nproperty float z\n\
+                  element face 1\nproperty list uchar int vertex_indices\n";
+    let rows = ".5 -.5 1.\n+1 1e1 -2.E-1\n0 0 inf\nnan 0 0\n3 0 1 2\n";
+    let mesh = read(text(header, rows).as_bytes(), "a.ply").unwrap();
+    assert_eq!(mesh.positions[..3], [[0.5, -0.5, 1.0], [1.0, 10.0, -0.2], [0.0, 0.0, f32::INFINITY]]);
+    assert!(mesh.positions[3][0].is_nan());
+    for (from, to) in [("+1", "1,5"), ("1e1", "0x1"), ("3 0", "3 0.0")] {
+        let (said, word) = (refusal(text(header, &rows.replace(from, to)).as_bytes()), to.trim_start_matches("3 "));
+        let line = if word == to { 11 } else { 14 };
+        assert!(said.contains(&format!("has \"{word}\" in place of a number of its type in line {line}")), "{said}");
+    }
+}
+
+#[test]
+fn what_faces_have_and_is_not_read_is_named() {
+    let vertex = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+    let face = "element face 1\nproperty list uchar int vertex_indices\n";
+    let said = |more: &str, row: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, mut library) = (folder.path().join("a.ply"), Library::default());
+        std::fs::write(&path, text(&format!("{vertex}{face}{more}"), &format!("0 0 0\n1 0 0\n0 1 0\n{row}\n")))
+            .unwrap();
+        load(&path, Numbering::Shared, &mut library).unwrap();
+        library.warnings
+    };
+    assert_eq!(said("", "3 0 1 2"), Vec::<String>::new());
+    let both = said("property list uchar float texcoord\nproperty uchar red\n", "3 0 1 2 6 0 0 1 0 0 1 255");
+    assert!(
+        both.len() == 1 && both[0].ends_with("a.ply: not read: texture coordinates of faces, colours of faces"),
+        "{both:?}"
+    );
+}
