@@ -42,6 +42,26 @@ fn a_library_is_read_once_however_often_it_is_named() {
 }
 
 #[test]
+fn the_name_of_a_library_may_stand_in_quotes() {
+    for named in ["\"my lib.mtl\"", "\"b.mtl\" \"my lib.mtl\""] {
+        let obj = format!("mtllib {named}\n{TRIANGLE}usemtl a\nf 1//1 2//1 3//1\n");
+        let folder = folder(&[("my lib.mtl", "newmtl a\nKd 1 0 0\n"), ("b.mtl", "newmtl b\n"), ("a.obj", &obj)]);
+        let scene = load(&folder, "a.obj").unwrap();
+        assert_eq!(scene.materials[scene.triangles[0].material as usize].base_color, [1.0, 0.0, 0.0], "{named}");
+    }
+}
+
+#[test]
+fn what_is_not_read_is_named() {
+    let obj = format!("mtllib m.mtl\n{TRIANGLE}f 1//1 2//1 3//1\ncurv 0 1 1 2 3\nsurf 0 1 0 1 1 2\nsurf 0 1 0 1 2 3\n");
+    let folder = folder(&[("m.mtl", "newmtl a\nrefl -type sphere a.png\n"), ("a.obj", &obj)]);
+    let said = load(&folder, "a.obj").unwrap().scene.warnings;
+    for words in ["a.obj: not read: curv, surf", "m.mtl: not read: refl"] {
+        assert_eq!(said.iter().filter(|line| line.ends_with(words)).count(), 1, "{said:?}");
+    }
+}
+
+#[test]
 fn what_is_missing_is_said_once() {
     let named = "mtllib no.mtl\n".repeat(200_000);
     let worn: String = (0..100).map(|i| format!("usemtl n{i:03}\nf 1//1 2//1 3//1\n")).collect();

@@ -60,6 +60,10 @@ impl Library {
         let text = String::from_utf8_lossy(&bytes);
         memory::need(path.display(), BYTES_OF_MATERIAL * text.matches("newmtl").count() as u64)?;
         let blocks = mtl::parse(path, &text)?;
+        let unread = mtl::unread(&text);
+        if !unread.is_empty() {
+            self.warnings.push(format!("{}: not read: {}", path.display(), unread.join(", ")));
+        }
         let named: Named =
             blocks.iter().map(|b| Ok((b.name().to_owned(), self.block(path, b)?))).collect::<Result<_>>()?;
         self.mtls.insert(known, named.clone());
@@ -94,12 +98,12 @@ impl Library {
 pub fn find(obj: &Path, statement: &str) -> (Vec<PathBuf>, Vec<String>) {
     let directory = obj.parent().unwrap_or(Path::new(""));
     let written = statement.trim().replace('\\', "/");
-    let whole = find_file(directory, &written).map(|(path, _)| path);
+    let whole = find_file(directory, written.trim_matches('"')).map(|(path, _)| path);
     if let Some(path) = whole {
         return (vec![path], Vec::new());
     }
     let (mut found, mut missing) = (Vec::new(), Vec::new());
-    for file in split_files(&written) {
+    for file in split_files(&written.replace('"', "")) {
         match find_file(directory, &file) {
             Some((path, _)) => found.push(path),
             None => missing.push(file),

@@ -4,6 +4,7 @@ use super::blocks::Statements;
 use super::mapping::Mapping;
 use crate::error::{Error, Result};
 use crate::scene::description::texture::Wrap;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A statement that names a map.
@@ -119,6 +120,24 @@ pub fn parse(path: &Path, text: &str) -> Result<Vec<Mtl>> {
     let (blocks, _) = tobj::load_mtl_buf(&mut checked.as_bytes()).map_err(|e| Error::input(path, e.to_string()))?;
     let directory = path.parent().unwrap_or(Path::new(""));
     Ok(blocks.into_iter().map(|block| Mtl { directory: directory.to_owned(), block }).collect())
+}
+
+/// The statements that change what a material looks like and are not read, in lower case. Exporters write those without a value
+/// as 0.
+const UNREAD: [&str; 11] =
+    ["map_pm", "map_ns", "map_ps", "map_pc", "disp", "map_disp", "decal", "refl", "pc", "ps", "aniso"];
+
+/// Which of those a file has, as it first spells each, in their order.
+pub fn unread(text: &str) -> Vec<String> {
+    let mut found: BTreeMap<usize, String> = BTreeMap::new();
+    for (_, line) in Statements::of(text) {
+        let (key, rest) = next_word(line.trim());
+        let place = UNREAD.iter().position(|lower| lower.eq_ignore_ascii_case(key));
+        if let Some(place) = place.filter(|_| rest.parse() != Ok(0.0)) {
+            found.entry(place).or_insert_with(|| key.to_owned());
+        }
+    }
+    found.into_values().collect()
 }
 
 /// A statement as tobj reads it, with a line feed; nothing for one that means nothing here.
@@ -244,6 +263,15 @@ mod tests {
         let odd = of(&one("map_Ks -s nan 1e30 -o inf a.png").block.specular_texture);
         assert_eq!((odd.file.as_str(), odd.mapping), ("a.png", Mapping::default()));
         assert_eq!(one("map_Kd -s 1 1 1").block.diffuse_texture, None);
+    }
+
+    #[test]
+    fn what_is_not_read_is_named_unless_it_is_0() {
+        assert_eq!(unread("newmtl a\nKd 1 0 0\nPs 0\nPc 0.000000\naniso 0\nmap_Ka a.png"), Vec::<String>::new());
+        assert_eq!(
+            unread("newmtl a\nPs 1\nMap_Ns a.png\nnewmtl b\nmap_ns b.png\n\trefl -type sphere c.png"),
+            ["Map_Ns", "refl", "Ps"]
+        );
     }
 
     #[test]

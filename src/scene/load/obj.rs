@@ -98,6 +98,8 @@ struct Parser<'a> {
     libraries: HashSet<PathBuf>,
     /// Names of libraries that do not exist.
     missing: BTreeSet<String>,
+    /// Keys of curves and curved surfaces.
+    curved: BTreeSet<&'static str>,
     /// Faces of one or two corners, dropped: how many, and the line of the first.
     short_faces: (usize, usize),
     /// Approximate bytes of what was read so far, and the number for which memory was checked.
@@ -122,6 +124,7 @@ impl<'a> Parser<'a> {
             statements: HashSet::new(),
             libraries: HashSet::new(),
             missing: BTreeSet::new(),
+            curved: BTreeSet::new(),
             short_faces: (0, 0),
             held: 0,
             asked: UNASKED,
@@ -155,6 +158,10 @@ impl<'a> Parser<'a> {
                 }
                 Statement::Wear(name) => {
                     self.wear(name);
+                    Ok(())
+                }
+                Statement::Curved(key) => {
+                    self.curved.insert(key);
                     Ok(())
                 }
                 Statement::Libraries(names) => {
@@ -247,6 +254,10 @@ impl<'a> Parser<'a> {
         if let (short @ 1.., line) = self.short_faces {
             let what = format!("{short} of fewer than three corners dropped, the first in line {line}");
             self.library.warnings.push(format!("{}: faces repaired: {what}", self.path.display()));
+        }
+        if !self.curved.is_empty() {
+            let keys: Vec<_> = self.curved.iter().copied().collect();
+            self.library.warnings.push(format!("{}: not read: {}", self.path.display(), keys.join(", ")));
         }
         for part in self.parts.iter_mut().filter(|part| part.material == NONE) {
             part.material = self.library.grey();

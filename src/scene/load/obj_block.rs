@@ -38,6 +38,8 @@ pub enum Statement {
     Wear(String),
     /// `mtllib`.
     Libraries(String),
+    /// A curved surface or curve, which is not read: its key.
+    Curved(&'static str),
 }
 
 impl ObjBlock {
@@ -79,6 +81,8 @@ impl ObjBlock {
             "usemtl" if rest.trim().is_empty() => return Err(mend("usemtl names no material")),
             "usemtl" => Statement::Wear(name()),
             "mtllib" => Statement::Libraries(name()),
+            "surf" => Statement::Curved("surf"),
+            "curv" => Statement::Curved("curv"),
             _ => return Ok(()),
         };
         self.statements.push((line, statement));
