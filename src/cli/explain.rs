@@ -256,20 +256,18 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         let records = scene.shading.iter().filter(|s| s.attributes & bit != 0).count();
         records * scene::attribute_words(bit) as usize * size_of::<u32>()
     };
-    let maps = |of: fn(&Material) -> [u32; 4]| {
-        let named: BTreeSet<u32> = scene.materials.iter().flat_map(of).filter(|&map| map != NONE).collect();
-        let texels = |map: u32| (scene.textures[map as usize].width * scene.textures[map as usize].height) as usize;
-        named.into_iter().map(|map| texels(map) * size_of::<u32>()).sum()
-    };
-    let lights = |kind: u32| {
-        let lights = scene.lights.iter().filter(|light| light.kind == kind);
-        lights.count() * (size_of::<Light>() + size_of::<AliasEntry>())
+    // Textures may share the texels of a picture.
+    let pictures = |of: &dyn Fn(Effect) -> bool| -> BTreeSet<(u32, usize)> {
+        let read = scene.materials.iter().flat_map(Material::textures).filter(|&(reader, _)| of(reader));
+        let textures = read.map(|(_, index)| &scene.textures[index as usize]);
+        textures.map(|t| (t.first, t.width as usize * t.height as usize)).collect()
     };
     let bytes = match effect {
-        Effect::textures => maps(|m| [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture]),
-        Effect::bump_maps => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP == 0 { m.bump_texture } else { NONE }; 4]),
-        Effect::normal_maps => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP != 0 { m.bump_texture } else { NONE }; 4]),
-        Effect::alpha_masks => maps(|m| [m.opacity_texture; 4]),
+        Effect::textures | Effect::bump_maps | Effect::normal_maps | Effect::coat_normals | Effect::alpha_masks => {
+            let others = pictures(&|reader| reader != effect);
+            let own = pictures(&|reader| reader == effect);
+            own.difference(&others).map(|(_, texels)| texels * size_of::<u32>()).sum()
+        }
         Effect::vertex_colors => attributes(ATTRIBUTE_COLORS),
         Effect::second_uv => attributes(ATTRIBUTE_SECOND_UV),
         Effect::tangents => attributes(ATTRIBUTE_TANGENTS),
@@ -278,11 +276,14 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         Effect::environment_map => {
             scene.environment.as_ref().map_or(0, |e| size_of_val(&e.texels[..]) + size_of_val(&e.table[..]))
         }
-        Effect::emissive => lights(LIGHT_TRIANGLE) + lights(LIGHT_MIRRORED),
-        Effect::point_lights => lights(LIGHT_POINT),
-        Effect::spot_lights => lights(LIGHT_SPOT),
-        Effect::directional_lights => lights(LIGHT_DIRECTIONAL),
-        Effect::environment => lights(LIGHT_ENVIRONMENT),
+        Effect::emissive
+        | Effect::point_lights
+        | Effect::spot_lights
+        | Effect::directional_lights
+        | Effect::environment => {
+            let lights = scene.lights.iter().filter(|light| light.effect() == Some(effect));
+            lights.count() * (size_of::<Light>() + size_of::<AliasEntry>())
+        }
         // A sphere takes the record of a triangle, and these lights are only sampled in another way.
         Effect::spheres | Effect::large_lamps | Effect::two_sided_lamps | Effect::weighed_lights => 0,
         // Every texture has room for these, and every material for its cutoff.
@@ -294,7 +295,6 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::coated
         | Effect::metallic
         | Effect::clearcoat
-        | Effect::coat_normals
         | Effect::anisotropic
         | Effect::thin_walls
         | Effect::clear_walls
@@ -345,7 +345,25 @@ pub fn text(rows: &[EffectRow]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{EffectRow, text};
+    use super::*;
+
+    #[test]
+    fn bytes_are_those_of_what_no_other_effect_reads() {
+        let texture = |first, width, height| Texture { first, width, height, ..Texture::default() };
+        let maps = Material { opacity_texture: NONE, bump_texture: NONE, ..Material::default() };
+        let [sphere, mirrored] = [LIGHT_SPHERE, LIGHT_MIRRORED].map(|kind| Light { kind, ..Light::default() });
+        let mut scene = Scene {
+            textures: vec![texture(0, 1 << 16, 1 << 16), texture(1, 2, 2), texture(5, 3, 1), texture(5, 3, 1)],
+            materials: vec![Material { clearcoat_roughness_texture: 1, clearcoat_normal_texture: 2, ..maps }],
+            lights: vec![sphere, mirrored],
+            ..Scene::default()
+        };
+        assert_eq!(scene_bytes(Effect::textures, &scene), 4 * ((1 << 32) + 4));
+        assert_eq!([Effect::coat_normals, Effect::alpha_masks].map(|e| scene_bytes(e, &scene)), [12, 0]);
+        assert_eq!(scene_bytes(Effect::emissive, &scene), 2 * (size_of::<Light>() + size_of::<AliasEntry>()) as u64);
+        scene.materials.push(Material { bump_texture: 3, clearcoat_normal_texture: NONE, ..maps });
+        assert_eq!(scene_bytes(Effect::coat_normals, &scene), 0, "a bump map has the same texels");
+    }
 
     #[test]
     fn costs_not_measured_are_dashes() {

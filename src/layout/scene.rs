@@ -1,4 +1,9 @@
 //! Structs of a scene as kernels read it: camera, geometry, materials, lights.
+use super::constants::{
+    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_MIRRORED, LIGHT_POINT, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_TRIANGLE,
+    MATERIAL_NORMAL_MAP, NONE,
+};
+use super::effects::Effect;
 #[cfg(doc)]
 use super::*;
 use super::{Field, Struct, float, uint, uvec2, uvec3, vec2, vec3, vec4};
@@ -241,5 +246,76 @@ gpu_structs! {
         threshold: uint,
         /// Index of the slot's other entry.
         alias: uint,
+    }
+}
+
+impl Material {
+    /// Every texture that it names, as an index among the scene's, with the effect that reads it.
+    pub fn textures(&self) -> impl Iterator<Item = (Effect, u32)> {
+        let normal_map = self.flags & MATERIAL_NORMAL_MAP != 0;
+        let bump = if normal_map { Effect::normal_maps } else { Effect::bump_maps };
+        let all = [
+            (Effect::textures, self.base_texture),
+            (Effect::textures, self.specular_texture),
+            (Effect::textures, self.roughness_texture),
+            (Effect::textures, self.emission_texture),
+            (Effect::textures, self.specular_factor_texture),
+            (Effect::textures, self.transmission_texture),
+            (Effect::textures, self.clearcoat_texture),
+            (Effect::textures, self.clearcoat_roughness_texture),
+            (Effect::coat_normals, self.clearcoat_normal_texture),
+            (Effect::alpha_masks, self.opacity_texture),
+            (bump, self.bump_texture),
+        ];
+        all.into_iter().filter(|&(_, index)| index != NONE)
+    }
+}
+
+impl Light {
+    /// The effect that samples it; `None` where `kind` is none of the LIGHT_ constants.
+    pub fn effect(&self) -> Option<Effect> {
+        match self.kind {
+            LIGHT_TRIANGLE | LIGHT_MIRRORED | LIGHT_SPHERE => Some(Effect::emissive),
+            LIGHT_POINT => Some(Effect::point_lights),
+            LIGHT_SPOT => Some(Effect::spot_lights),
+            LIGHT_DIRECTIONAL => Some(Effect::directional_lights),
+            LIGHT_ENVIRONMENT => Some(Effect::environment),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a triangle or a sphere of the scene, which rays meet.
+    pub fn has_surface(&self) -> bool {
+        self.effect() == Some(Effect::emissive)
+    }
+
+    /// Whether it has no extent, so that light sampling alone finds it.
+    pub fn is_delta(&self) -> bool {
+        matches!(self.effect(), Some(Effect::point_lights | Effect::spot_lights | Effect::directional_lights))
+    }
+
+    /// Whether it is infinitely far away.
+    pub fn is_far(&self) -> bool {
+        matches!(self.effect(), Some(Effect::directional_lights | Effect::environment))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::cast_slice_mut;
+
+    #[test]
+    fn a_material_tells_of_every_texture() {
+        let described = super::STRUCTS.iter().find(|s| s.name == "Material").unwrap();
+        let fields: Vec<_> = described.fields.iter().filter(|f| f.name.ends_with("_texture")).collect();
+        assert_eq!(fields.len(), 11);
+        for field in &fields {
+            let mut material = Material::default();
+            let words: &mut [u32] = cast_slice_mut(std::slice::from_mut(&mut material));
+            fields.iter().for_each(|other| words[other.offset / 4] = NONE);
+            words[field.offset / 4] = 7;
+            assert_eq!(material.textures().map(|(_, index)| index).collect::<Vec<_>>(), [7], "{}", field.name);
+        }
     }
 }

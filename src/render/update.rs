@@ -7,7 +7,7 @@ use super::upload::{parts, whole};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Recorder};
 use crate::layout::{Effect, Effects};
-use crate::scene::{Change, Scene, keeps_soft_light_apart, light_effects};
+use crate::scene::{Change, Scene, keeps_soft_light_apart, light_and_camera_effects};
 
 impl Renderer {
     /// Records the upload of what a pose has changed: see [`Scene::apply`]. Frames that were recorded before keep the scene as it was,
@@ -72,7 +72,7 @@ impl Renderer {
         // Whether surfaces call for something takes a look at all of them.
         let called = match change.materials || !change.triangles.is_empty() {
             true => called_for(scene, &self.settings, self.outputs),
-            false => light_effects(scene),
+            false => light_and_camera_effects(scene),
         };
         // Where light is not split, what is soft of it makes no difference.
         let soft_light = self.effects.split_light && keeps_soft_light_apart(scene, &self.settings);

@@ -6,8 +6,8 @@ use super::build::coat::reads_table;
 use super::{Environment, Scene};
 use crate::error::{Error, Result};
 use crate::layout::{
-    AliasEntry, BSDF_METALLIC, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_MIRRORED, LIGHT_SPHERE, LIGHT_TRIANGLE,
-    Light, Material, NONE, SPHERE, Shading, TRAVERSAL_STACK, Texture, Triangle,
+    AliasEntry, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, Material, NONE, SPHERE, Shading, TRAVERSAL_STACK, Texture,
+    Triangle,
 };
 use glam::Vec3;
 
@@ -123,19 +123,9 @@ impl Scene {
 
     fn textures_fit(&self) -> Checked {
         let all = self.textures.len();
-        let of = |m: &Material| {
-            let shown =
-                [m.base_texture, m.specular_texture, m.roughness_texture, m.opacity_texture, m.emission_texture];
-            shown.into_iter().chain([m.bump_texture, m.clearcoat_normal_texture])
-        };
-        let layers = |m: &Material| {
-            let coat = [m.clearcoat_texture, m.clearcoat_roughness_texture];
-            let metallic = m.kind == BSDF_METALLIC;
-            [m.specular_factor_texture, m.transmission_texture].into_iter().chain(coat).filter(move |_| metallic)
-        };
         for (index, material) in self.materials.iter().enumerate() {
-            let maps = of(material).chain(layers(material));
-            below_or_none("map", "texture", all, maps).map_err(|what| format!("material {index}: {what}"))?;
+            let maps = material.textures().map(|(_, map)| map);
+            below("map", "texture", all, maps).map_err(|what| format!("material {index}: {what}"))?;
         }
         let texels = self.texels.len() as u64;
         let table = u64::from(COAT_ROWS * COAT_COLUMNS);
@@ -154,9 +144,10 @@ impl Scene {
     }
 
     fn lights_fit(&self) -> Checked {
-        let on_surface = |light: &Light| matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED | LIGHT_SPHERE);
-        let emissive = || self.lights.iter().enumerate().filter(|(_, light)| on_surface(light));
-        for (index, light) in emissive() {
+        if let Some(index) = self.lights.iter().position(|light| light.effect().is_none()) {
+            return Err(format!("light {index}: its kind {} is none of the LIGHT_ constants", self.lights[index].kind));
+        }
+        for (index, light) in self.lights.iter().enumerate().filter(|(_, light)| light.has_surface()) {
             let of = |what| format!("light {index}: {what}");
             below("it", "triangle", self.triangles.len(), [light.triangle]).map_err(of)?;
             below("it", "material", self.materials.len(), [light.material]).map_err(of)?;

@@ -22,22 +22,12 @@ pub fn effects(
         first.inspect(|&i| reasons.push((name, format!("material \"{}\"", named(i))))).is_some()
     };
     let interface = |m: &Material| m.kind != BSDF_DIFFUSE;
-    let bumped =
-        |m: &Material, normal_map| m.bump_texture != NONE && (m.flags & MATERIAL_NORMAL_MAP != 0) == normal_map;
-    // A roughness map may take any part of the surface below the line.
-    let layers = |m: &Material| match m.kind {
-        BSDF_METALLIC => {
-            let coat = [m.clearcoat_texture, m.clearcoat_roughness_texture, m.clearcoat_normal_texture];
-            [m.specular_factor_texture, m.transmission_texture, coat[0], coat[1], coat[2]]
-        }
-        _ => [NONE; 5],
-    };
+    let mapped = |m: &Material, effect| m.textures().any(|(reader, _)| reader == effect);
     let flagged = |m: &Material, flags: u32| {
-        let maps = [m.base_texture, m.specular_texture, m.opacity_texture, m.bump_texture, m.roughness_texture];
-        let maps = maps.into_iter().chain([m.emission_texture]).chain(layers(m));
-        maps.filter_map(|t| scene.textures.get(t as usize)).any(|t| t.flags & flags != 0)
+        m.textures().filter_map(|(_, t)| scene.textures.get(t as usize)).any(|t| t.flags & flags != 0)
     };
     let coated = |m: &Material| m.kind == BSDF_METALLIC && m.clearcoat > 0.0;
+    // A roughness map may take any part of the surface below the line.
     let smooth = |m: &Material| {
         let coat = coated(m) && (m.clearcoat_alpha < SMOOTH_ALPHA || m.clearcoat_roughness_texture != NONE);
         interface(m) && (m.alpha < SMOOTH_ALPHA || m.roughness_texture != NONE) || coat
@@ -50,16 +40,13 @@ pub fn effects(
     let sharp = scene.has_delta_lights();
     let clear_wall = |m: &Material| sharp && m.flags & MATERIAL_CLEAR_WALL != 0;
     let mut found = Effects {
-        textures: material(Effect::textures, &|m| {
-            let maps = [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture];
-            maps.iter().chain(&layers(m)).any(|&t| t != NONE)
-        }),
+        textures: material(Effect::textures, &|m| mapped(m, Effect::textures)),
         texture_modes: material(Effect::texture_modes, &|m| flagged(m, MODES)),
         hdr_textures: material(Effect::hdr_textures, &|m| flagged(m, TEXTURE_RGB9E5 | TEXTURE_FLOAT)),
         second_uv: material(Effect::second_uv, &|m| flagged(m, TEXTURE_SECOND_UV)),
         alpha_cutoff: material(Effect::alpha_cutoff, &|m| m.flags & MATERIAL_MASKED != 0 && m.alpha_cutoff > 0.0),
-        bump_maps: material(Effect::bump_maps, &|m| bumped(m, false)),
-        normal_maps: material(Effect::normal_maps, &|m| bumped(m, true)),
+        bump_maps: material(Effect::bump_maps, &|m| mapped(m, Effect::bump_maps)),
+        normal_maps: material(Effect::normal_maps, &|m| mapped(m, Effect::normal_maps)),
         alpha_masks: material(Effect::alpha_masks, &|m| m.flags & MATERIAL_MASKED != 0 || clear_wall(m)),
         diffuse: material(Effect::diffuse, &|m| matches!(m.kind, BSDF_DIFFUSE | BSDF_COATED)),
         conductor: material(Effect::conductor, &|m| m.kind == BSDF_CONDUCTOR),
@@ -78,7 +65,8 @@ pub fn effects(
         ggx: material(Effect::ggx, &|m| rough(m) && m.flags & MATERIAL_GGX != 0),
         ..Effects::default()
     };
-    add_light_effects(scene, &mut found, &mut reasons);
+    light_effects(scene, &mut found, &mut reasons);
+    camera_effects(scene, &mut found, &mut reasons);
     scene_effects(scene, &mut found, &mut reasons);
     setting_effects(settings, &mut found, &mut reasons);
     let soft = keeps_soft_light_apart(scene, settings);
@@ -105,27 +93,27 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
     used
 }
 
-/// Those of the effects that lights and the camera's lens call for.
-pub fn light_effects(scene: &Scene) -> Effects {
-    let (lens, orthographic) = (scene.view.lens_radius > 0.0, scene.view.orthographic.is_some());
-    let mut found = Effects { lens, orthographic, ..Effects::default() };
-    add_light_effects(scene, &mut found, &mut Vec::new());
+/// Those of the effects that lights and the camera call for.
+pub fn light_and_camera_effects(scene: &Scene) -> Effects {
+    let mut found = Effects::default();
+    light_effects(scene, &mut found, &mut Vec::new());
+    camera_effects(scene, &mut found, &mut Vec::new());
     found
 }
 
-fn add_light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(Effect, String)>) {
-    let mut any = |name, of: &dyn Fn(u32) -> bool| {
-        let first = scene.lights.iter().position(|l| of(l.kind));
-        first.inspect(|&i| reasons.push((name, light_name(scene, i)))).is_some()
+fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
+    let mut light = |effect| {
+        let first = scene.lights.iter().position(|l| l.effect() == Some(effect));
+        first.inspect(|&i| reasons.push((effect, light_name(scene, i)))).is_some()
     };
-    let panels = any(Effect::emissive, &|kind| matches!(kind, LIGHT_TRIANGLE | LIGHT_MIRRORED));
-    let mut light = |name, kind| any(name, &|of| of == kind);
-    found.emissive = panels || light(Effect::emissive, LIGHT_SPHERE);
-    found.point_lights = light(Effect::point_lights, LIGHT_POINT);
-    found.spot_lights = light(Effect::spot_lights, LIGHT_SPOT);
-    found.directional_lights = light(Effect::directional_lights, LIGHT_DIRECTIONAL);
-    found.environment = light(Effect::environment, LIGHT_ENVIRONMENT);
-    found.environment_map = scene.environment.is_some() && light(Effect::environment_map, LIGHT_ENVIRONMENT);
+    found.emissive = light(Effect::emissive);
+    found.point_lights = light(Effect::point_lights);
+    found.spot_lights = light(Effect::spot_lights);
+    found.directional_lights = light(Effect::directional_lights);
+    found.environment = light(Effect::environment);
+    let mapped = found.environment && scene.environment.is_some();
+    found.environment_map = because(reasons, Effect::environment_map, mapped, "environment".into());
+    let panels = scene.lights.iter().any(lights::is_panel);
     let large = scene.lights.iter().position(|l| lights::is_large(scene, l));
     let name = large.map_or_else(|| "lamps that were or may come to be large".to_owned(), |i| light_name(scene, i));
     let weighed = scene.weighed_lights;
@@ -159,6 +147,12 @@ const DEALT_FROM: usize = 1000;
 /// Most texels of textures that are read one at a time: views of more are beyond the limit of lavapipe and of NVIDIA's driver.
 const NARROW_TEXELS: usize = 1 << 27;
 
+fn camera_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
+    let mut because = |name, on, why: &str| because(reasons, name, on, why.to_owned());
+    found.lens = because(Effect::lens, scene.view.lens_radius > 0.0, "camera lens_radius");
+    found.orthographic = because(Effect::orthographic, scene.view.orthographic.is_some(), "camera orthographic");
+}
+
 fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
     let mut because = |name, on, why| because(reasons, name, on, why);
     let bent = scene.shading.iter().position(|s| s.normal != geometry::FLAT);
@@ -177,8 +171,6 @@ fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
     let ball = scene.triangles.iter().find(|t| t.primitive & SPHERE != 0);
     let object = ball.and_then(|t| scene.names.objects.get(t.object as usize));
     found.spheres = because(Effect::spheres, ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));
-    found.lens = because(Effect::lens, scene.view.lens_radius > 0.0, "camera lens_radius".into());
-    found.orthographic = because(Effect::orthographic, scene.view.orthographic.is_some(), "camera orthographic".into());
     let instances = scene.instances.len();
     found.instances = because(Effect::instances, instances > 0, format!("{instances} instances"));
     let triangles = scene.triangles.len();

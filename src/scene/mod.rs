@@ -9,7 +9,6 @@ use crate::scene::description::settings::Settings;
 use crate::threads;
 use animation::{Animation, Mover};
 use build::assemble::{Choices, assemble};
-use build::lights::is_delta;
 use description::Description;
 use load::mesh_file::Format;
 use load::{gltf, include};
@@ -36,7 +35,7 @@ pub use build::coat::{CoatRow, coat_table, microfacet_table};
 pub use build::fresnel::mean_internal as mean_internal_fresnel;
 pub use change::{Change, Deformed};
 pub use check::check_camera;
-pub use effects::{effects, keeps_soft_light_apart, light_effects};
+pub use effects::{effects, keeps_soft_light_apart, light_and_camera_effects};
 pub use fingerprint::Fingerprint;
 pub use pose::{EnvironmentChange, MaterialChange, Pose, REBUILD_ABOVE, Vertices};
 pub use relit::Relit;
@@ -325,13 +324,13 @@ impl Scene {
 
     /// Whether there are point, spot or directional lights, be they dark now.
     pub fn has_delta_lights(&self) -> bool {
-        self.lights.iter().chain(&self.rig.lights).any(is_delta)
+        self.lights.iter().chain(&self.rig.lights).any(Light::is_delta)
     }
 
     /// Whether some light may bring noise to what is lit by it alone: lamps and a sky, which have an extent, and one of several point, spot
     /// and directional lights, of which a sample chooses one.
     pub fn has_soft_lights(&self) -> bool {
-        let count = |lights: &[Light]| lights.iter().filter(|light| is_delta(light)).count();
+        let count = |lights: &[Light]| lights.iter().filter(|light| light.is_delta()).count();
         // Those that are dark now are in the rig.
         count(&self.lights) < self.lights.len() || count(&self.lights).max(count(&self.rig.lights)) > 1
     }

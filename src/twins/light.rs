@@ -254,16 +254,12 @@ fn unshadowed(light: &Light, r: &Receiver) -> f32 {
     if cosine > 0.0 || r.lets_light_through { brings } else { 0.0 }
 }
 
-fn is_delta(light: &Light) -> bool {
-    matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL)
-}
-
 /// Chooses anew among the lights without extent, which lie before those with a surface: by what each would bring if nothing were in
 /// its way.
 fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
     let (mut chosen, mut sum, mut odds, mut group) = (scene.lights[0], 0.0, 0.0, 0.0);
     let beside_sky = scene.lights.iter().filter(|l| l.kind != LIGHT_ENVIRONMENT);
-    for light in beside_sky.take_while(|l| is_delta(l)) {
+    for light in beside_sky.take_while(|l| l.is_delta()) {
         group += light.probability;
         let brings = unshadowed(light, r);
         sum += brings;
@@ -299,7 +295,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
     let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
     let (mut light, p) = (&scene.lights[chosen as usize], r.position);
     let weighed;
-    if scene.weighed_lights && is_delta(light) {
+    if scene.weighed_lights && light.is_delta() {
         weighed = choose_by_share(scene, r, u.x);
         light = &weighed;
     }

@@ -422,6 +422,7 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
     refused("a texture without texels", &|s| s.textures[0].width = 0);
     refused("shading of some triangles", &|s| s.shading.truncate(3));
     refused("a lamp that is not there", &|s| s.lights.iter_mut().for_each(|l| l.triangle = 1 << 20));
+    refused("a light of no kind", &|s| s.lights[0].kind = 99);
     refused("an alias that is not there", &|s| s.light_table[0].alias = 1 << 20);
     refused("lights without a table", &|s| s.light_table.clear());
     refused("a sky of another size", &|s| s.environment.as_mut().unwrap().width += 1);

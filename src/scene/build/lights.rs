@@ -31,7 +31,7 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     choose_unit(scene);
     list(scene)?;
     scene.large_lamps = scene.lights.iter().any(|l| is_large(scene, l));
-    scene.weighed_lights = WEIGHED.contains(&scene.rig.lights.iter().filter(|l| is_delta(l)).count());
+    scene.weighed_lights = WEIGHED.contains(&scene.rig.lights.iter().filter(|l| l.is_delta()).count());
     Ok(())
 }
 
@@ -169,8 +169,7 @@ fn corners(light: &Light) -> [[u32; 3]; 3] {
 /// A warning about lamps that lie on others of another material or front. None of them can be dropped: which of two rays meet depends
 /// on their direction and on how the hierarchy is walked.
 pub fn coincident(scene: &Scene) -> Option<String> {
-    let has_surface = |l: &&Light| matches!(l.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED | LIGHT_SPHERE);
-    let lamps: Vec<_> = scene.lights.iter().filter(has_surface).collect();
+    let lamps: Vec<_> = scene.lights.iter().filter(|light| light.has_surface()).collect();
     let place = |i: usize| {
         let mut corners = corners(lamps[i]);
         corners.sort_unstable(); // whichever side is in front
@@ -218,8 +217,12 @@ const LARGE: f64 = 0.01;
 /// Whether a lamp is so large that, seen from points near it, its nearest parts outshine the others.
 pub fn is_large(scene: &Scene, light: &Light) -> bool {
     let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
+    is_panel(light) && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
+}
+
+/// Whether a light is a triangle.
+pub fn is_panel(light: &Light) -> bool {
     matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED)
-        && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
 }
 
 /// How many lights without extent are weighed at every point: it takes time in proportion to their number.
@@ -231,12 +234,7 @@ const WEIGHED: RangeInclusive<usize> = 2..=32;
 const DELTA_WEIGHT: f64 = 8.0;
 
 fn weight(light: &Light) -> f64 {
-    if is_delta(light) { DELTA_WEIGHT } else { 1.0 }
-}
-
-/// Whether a light has no extent.
-pub fn is_delta(light: &Light) -> bool {
-    matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL)
+    if light.is_delta() { DELTA_WEIGHT } else { 1.0 }
 }
 
 /// Least share of the choices that lights at infinity get beside those in the scene, and these beside them. Measured at 64 samples a pixel
@@ -247,14 +245,13 @@ const LEAST_SHARE: f64 = 0.25;
 /// Lights at infinity have the power that falls on the whole scene, which grows with ground that nobody looks at, while a lamp matters
 /// near itself. So neither kind is chosen less often than [`LEAST_SHARE`].
 fn share(lights: &[Light], weights: &mut [f64]) {
-    let is_far = |light: &Light| matches!(light.kind, LIGHT_DIRECTIONAL | LIGHT_ENVIRONMENT);
-    let sum = |far: bool| lights.iter().zip(&*weights).filter(|(l, _)| is_far(l) == far).map(|(_, w)| w).sum::<f64>();
+    let sum = |far: bool| lights.iter().zip(&*weights).filter(|(l, _)| l.is_far() == far).map(|(_, w)| w).sum::<f64>();
     let [near, far] = [sum(false), sum(true)];
     if near > 0.0 && far > 0.0 {
         let limit = LEAST_SHARE / (1.0 - LEAST_SHARE);
         // That of lamps stays, since `Scene::triangle_pdf_scale` counts in it.
         let factor = (far / near).clamp(limit, 1.0 / limit) * near / far;
-        lights.iter().zip(weights).filter(|(l, _)| is_far(l)).for_each(|(_, w)| *w *= factor);
+        lights.iter().zip(weights).filter(|(l, _)| l.is_far()).for_each(|(_, w)| *w *= factor);
     }
 }
 
@@ -271,6 +268,7 @@ fn power(scene: &Scene, light: &Light) -> f64 {
         LIGHT_POINT => 4.0 * PI * value,
         LIGHT_SPOT => 2.0 * PI * value * (1.0 - f64::from(light.c[0] + light.c[1]) / 2.0),
         LIGHT_DIRECTIONAL => PI * radius * radius * value,
-        _ => 4.0 * PI * PI * radius * radius * value * scene.rig.sky,
+        LIGHT_ENVIRONMENT => 4.0 * PI * PI * radius * radius * value * scene.rig.sky,
+        _ => 0.0,
     }
 }
