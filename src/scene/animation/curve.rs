@@ -90,9 +90,11 @@ mod tests {
     #[test]
     fn rotations_take_the_shortest_way() {
         let turn = |degrees: f64| DQuat::from_rotation_y(degrees.to_radians()).to_array().to_vec();
-        let c = Curve::new(vec![(0.0, turn(0.0)), (1.0, turn(90.0))], Interpolation::Linear, true).unwrap();
-        let half = DQuat::from_slice(&c.at(0.5));
-        assert!(half.dot(DQuat::from_rotation_y(45f64.to_radians())).abs() > 1.0 - 1e-12, "{half}");
+        for (end, middle) in [(90.0, 45.0), (270.0, -45.0)] {
+            let c = Curve::new(vec![(0.0, turn(0.0)), (1.0, turn(end))], Interpolation::Linear, true).unwrap();
+            let half = DQuat::from_slice(&c.at(0.5));
+            assert!(half.dot(DQuat::from_slice(&turn(middle))).abs() > 1.0 - 1e-12, "to {end}: {half}");
+        }
     }
 
     #[test]

@@ -189,8 +189,18 @@ mod tests {
         assert_eq!(found.forward, [0.0, 0.0, -1.0]);
         assert!((found.right[0] - 2.0).abs() < 1e-6 && (found.up[1] - 1.0).abs() < 1e-6);
         assert_eq!(found.focus_distance, 5.0);
-        let wide = Camera { fov_axis: FovAxis::Larger, ..camera }.build([200, 100], [[0.0; 3]; 2]).unwrap();
-        assert!((wide.right[0] - 1.0).abs() < 1e-6 && (wide.up[1] - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_field_of_view_spans_the_edge_that_is_named() {
+        use FovAxis::{Larger, Smaller, X, Y};
+        let (across, down) = ([X, Larger, X, Smaller], [Y, Smaller, Y, Larger]);
+        for (k, size, along) in [(0, [200, 100], 2.0), (2, [100, 200], 0.5)] {
+            let half = |fov_axis| Camera { fov_axis, fov: Some(90.0), ..Camera::default() }.half_film(size).unwrap();
+            let near = |(x, y): (f64, f64), of: [f64; 2]| (x - of[0]).abs() + (y - of[1]).abs() < 1e-12;
+            assert!(across[k..k + 2].iter().all(|&axis| near(half(axis), [1.0, 1.0 / along])), "{size:?}");
+            assert!(down[k..k + 2].iter().all(|&axis| near(half(axis), [along, 1.0])), "{size:?}");
+        }
     }
 
     #[test]

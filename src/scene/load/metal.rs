@@ -72,6 +72,27 @@ mod tests {
         }
     }
 
+    /// By name: what the constants that Tungsten ships give, and what Lagarde ("Feeding a physically based shading model", 2011) lists
+    /// from other measurements, which differ most for chromium. Both are linear Rec. 709.
+    const REFLECTANCES: [(&str, [f64; 3], [f64; 3], f64); 5] = [
+        ("silver", [0.9748, 0.9575, 0.9063], [0.9715, 0.9599, 0.9153], 0.04),
+        ("aluminium", [0.9280, 0.9178, 0.9189], [0.9132, 0.9215, 0.9245], 0.04),
+        ("gold", [0.9667, 0.8022, 0.3240], [1.0, 0.7656, 0.3361], 0.04),
+        ("chromium", [0.6875, 0.6491, 0.6870], [0.5496, 0.5561, 0.5543], 0.15),
+        ("copper", [0.9521, 0.6197, 0.5106], [0.9550, 0.6374, 0.5382], 0.04),
+    ];
+
+    #[test]
+    fn metals_reflect_what_is_published() {
+        assert_eq!(REFLECTANCES.map(|row| row.0).as_slice(), METALS.iter().map(|m| m.0[0]).collect::<Vec<_>>());
+        for (name, own, measured, apart) in REFLECTANCES {
+            let (eta, k) = metal(name).unwrap();
+            let found = [0, 1, 2].map(|c| conductor(1.0, eta[c].into(), k[c].into()));
+            let within = |of: [f64; 3], limit: f64| (0..3).all(|c| (found[c] - of[c]).abs() < limit);
+            assert!(within(own, 1e-4) && within(measured, apart), "{name}: {found:?}");
+        }
+    }
+
     #[test]
     fn metals_have_names() {
         assert_eq!(metal("Gold").unwrap(), metal("au").unwrap());
