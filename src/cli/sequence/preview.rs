@@ -4,7 +4,6 @@ use crate::image::{self, Film, WriteOptions, output};
 use ::image::codecs::gif::{GifEncoder, Repeat};
 use ::image::{Delay, Frame, RgbaImage};
 use std::path::Path;
-use std::time::Duration;
 
 /// Pixels of the longer edge at most.
 const EDGE: u32 = 480;
@@ -52,7 +51,37 @@ impl Preview {
     fn encode(&self, bytes: &mut Vec<u8>, fps: f64) -> std::result::Result<(), ::image::ImageError> {
         let mut encoder = GifEncoder::new_with_speed(bytes, 10);
         encoder.set_repeat(Repeat::Infinite)?;
-        let delay = Delay::from_saturating_duration(Duration::from_secs_f64((1.0 / fps).clamp(0.02, 600.0)));
-        self.0.iter().try_for_each(|small| encoder.encode_frame(Frame::from_parts(small.clone(), 0, 0, delay)))
+        // A file counts in hundredths of a second, so that some frames are shown for longer than others.
+        let hundredths = |frame: usize| (100.0 * frame as f64 / fps).round();
+        self.0.iter().enumerate().try_for_each(|(n, small)| {
+            let shown = (hundredths(n + 1) - hundredths(n)).clamp(2.0, 60_000.0);
+            let delay = Delay::from_numer_denom_ms(10 * shown as u32, 1);
+            encoder.encode_frame(Frame::from_parts(small.clone(), 0, 0, delay))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::image::AnimationDecoder;
+    use ::image::codecs::gif::GifDecoder;
+
+    /// Milliseconds for which each of so many frames is shown.
+    fn delays(frames: u32, fps: f64) -> Vec<u32> {
+        let mut bytes = Vec::new();
+        Preview((0..frames).map(|_| RgbaImage::new(1, 1)).collect()).encode(&mut bytes, fps).unwrap();
+        let read = GifDecoder::new(std::io::Cursor::new(bytes)).unwrap().into_frames().collect_frames().unwrap();
+        read.iter().map(|frame| frame.delay().numer_denom_ms().0).collect()
+    }
+
+    #[test]
+    fn a_preview_lasts_as_long_as_its_frames() {
+        for fps in [12, 24, 30, 48] {
+            let shown = delays(fps, fps.into());
+            assert_eq!(shown.iter().sum::<u32>(), 1000, "{fps}: {shown:?}");
+            assert!(shown.iter().all(|ms| ms.abs_diff(1000 / fps) <= 10), "{fps}: {shown:?}");
+        }
+        assert_eq!((delays(2, 60.0), delays(1, 1e-9)), (vec![20; 2], vec![600_000]));
     }
 }
