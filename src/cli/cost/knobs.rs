@@ -1,6 +1,7 @@
 //! The knobs that `tallow cost --ablate` turns, one at a time.
 use crate::allocate::Placing;
 use crate::cost::grid::Candidate;
+use crate::denoise::filter::readers;
 use crate::settings::entry::Entry;
 
 /// A knob, and the values that are tried of it: what a user would write behind `--`.
@@ -21,8 +22,8 @@ enum Reader {
     Placed,
     /// What is placed by one of these policies.
     Policies(&'static [&'static str]),
-    /// What is filtered by one of these filters.
-    Filters(&'static [&'static str]),
+    /// What is filtered by one of the filters that read the setting of this name.
+    Filters,
     /// What begins with samples of earlier frames.
     Carried,
 }
@@ -45,19 +46,19 @@ const KNOBS: &[Knob] = &[
     knob("sigma-position", &["0.01", "0.03", "0.1"], Policies(&["geometry", "both"])),
     knob("luminance-floor", &["0.01", "0.05", "0.2"], Policies(&["variance", "both"])),
     knob("filtered", &["0", "0.5", "0.9"], Policies(&["both"])),
-    knob("levels", &["3", "4", "5", "6"], Filters(&["atrous", "wavelet", "svgf"])),
-    knob("radius", &["6", "12", "24", "48"], Filters(&["bilateral", "guided", "auto"])),
-    knob("sigma-rt", &["0.3", "1", "3", "inf"], Filters(&["atrous", "bilateral", "wavelet"])),
-    knob("sigma-n", &["0.1", "0.3", "1", "inf"], Filters(&["atrous", "bilateral", "wavelet", "svgf", "auto"])),
-    knob("sigma-x", &["0.02", "0.05", "0.15", "inf"], Filters(&["atrous", "bilateral", "wavelet", "svgf", "auto"])),
-    knob("form", &["listing", "squared", "printed"], Filters(&["atrous"])),
-    knob("conserve-energy", &[], Filters(&["atrous"])),
-    knob("channels", &["1", "3", "4"], Filters(&["guided", "auto"])),
-    knob("eps", &["0.001", "0.003", "0.03", "0.1"], Filters(&["guided", "auto"])),
-    knob("sums", &["blocks", "table"], Filters(&["guided"])),
-    knob("sigma-l", &["2", "4", "8"], Filters(&["svgf", "auto"])),
-    knob("basis", &["cdf22", "red-black"], Filters(&["wavelet"])),
-    knob("oidn-quality", &["fast", "balanced", "high"], Filters(&["oidn"])),
+    knob("levels", &["2", "3", "4", "5", "6"], Filters),
+    knob("radius", &["6", "12", "24", "48"], Filters),
+    knob("sigma-rt", &["0.3", "1", "3", "inf"], Filters),
+    knob("sigma-n", &["0.1", "0.3", "1", "inf"], Filters),
+    knob("sigma-x", &["0.02", "0.05", "0.15", "inf"], Filters),
+    knob("form", &["listing", "squared", "printed"], Filters),
+    knob("conserve-energy", &[], Filters),
+    knob("channels", &["1", "3", "4"], Filters),
+    knob("eps", &["0.001", "0.003", "0.03", "0.1"], Filters),
+    knob("sums", &["blocks", "table"], Filters),
+    knob("sigma-l", &["2", "4", "8"], Filters),
+    knob("basis", &["cdf22", "red-black"], Filters),
+    knob("oidn-quality", &["fast", "balanced", "high"], Filters),
     // 1, 4 and 8 of 256: Schalk 2018.
     knob("reproject-error", &["0", "0.00390625", "0.015625", "0.03125"], Carried),
     knob("reproject-light", &["0.02", "0.05", "0.1", "0.2"], Carried),
@@ -68,14 +69,14 @@ const KNOBS: &[Knob] = &[
 
 /// The options that change one knob of a point to another value, such as `--levels 4`.
 pub fn steps(candidate: &Candidate) -> Vec<String> {
-    KNOBS.iter().filter(|knob| knob.read_by.holds(candidate)).flat_map(|knob| knob.steps(candidate)).collect()
+    KNOBS.iter().filter(|knob| knob.is_read_by(candidate)).flat_map(|knob| knob.steps(candidate)).collect()
 }
 
 /// Whether a point reads a setting that another one changes. What no knob names is read by all.
 pub fn reads_change(point: &Candidate, other: &Candidate) -> bool {
     let changed = |(own, others): (Entry, Entry)| (own.value != others.value).then_some(own.name);
     let mut changed = entries(point).into_iter().zip(entries(other)).filter_map(changed);
-    changed.any(|name| KNOBS.iter().filter(|knob| knob.name == name).all(|knob| knob.read_by.holds(point)))
+    changed.any(|name| KNOBS.iter().filter(|knob| knob.name == name).all(|knob| knob.is_read_by(point)))
 }
 
 fn entries(candidate: &Candidate) -> Vec<Entry> {
@@ -94,17 +95,15 @@ impl Knob {
         let switch = self.values.is_empty().then(|| format!("--{}", self.name));
         others.map(|value| format!("--{} {value}", self.name)).chain(switch).collect()
     }
-}
 
-impl Reader {
-    fn holds(&self, candidate: &Candidate) -> bool {
+    fn is_read_by(&self, candidate: &Candidate) -> bool {
         let policy = candidate.settings.allocate.policy;
-        match self {
+        match self.read_by {
             Paths => true,
             Filtered => candidate.filter.is_some(),
             Placed => policy.placing != Placing::Even,
             Policies(names) => names.contains(&policy.name),
-            Filters(names) => candidate.filter.is_some_and(|filter| names.contains(&filter.name())),
+            Filters => candidate.filter.is_some_and(|filter| readers(self.name).contains(&filter.name())),
             Carried => candidate.carries.is_some(),
         }
     }
@@ -186,7 +185,7 @@ mod tests {
     fn filters_read_the_knobs_that_name_them_and_no_others() {
         let input = input();
         let of_filters =
-            |knob: &&Knob| matches!(knob.read_by, Filters(_)) && !["oidn-quality", "sums"].contains(&knob.name);
+            |knob: &&Knob| matches!(knob.read_by, Filters) && !["oidn-quality", "sums"].contains(&knob.name);
         for filter in FILTERS {
             let candidate = candidate("uniform", Method::Kernels(filter), 4);
             let filtered = |settings: &FilterSettings| (filter.reference)(&input, &settings.scaled_to(&input));
@@ -196,7 +195,7 @@ mod tests {
                     with(&candidate, step).is_some_and(|varied| filtered(&varied.filter_settings) != plain)
                 };
                 let reads = knob.steps(&candidate).iter().any(differs);
-                assert_eq!(reads, knob.read_by.holds(&candidate), "{} of {}", knob.name, filter.name);
+                assert_eq!(reads, knob.is_read_by(&candidate), "{} of {}", knob.name, filter.name);
             }
         }
     }

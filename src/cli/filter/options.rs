@@ -1,9 +1,9 @@
 //! Options of `tallow filter` for layers and filter settings.
 use crate::cli::common::with_ranges;
-use crate::denoise::filter::{FILTERS, FilterOverrides, FilterSettings, Method, Row};
+use crate::denoise::filter::{FILTERS, FilterOverrides, FilterSettings, Method, Row, readers};
 use crate::image::aov::{Aov, Names};
-use clap::ValueEnum;
 use clap::builder::PossibleValue;
+use clap::{Arg, ValueEnum};
 use std::sync::LazyLock;
 
 /// Names of layers, for those that are not found or are not the right ones.
@@ -52,7 +52,11 @@ impl Layers {
 
 /// Settings given on the command line.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Filter settings", mut_args(with_ranges(FilterSettings::default().entries())))]
+#[command(
+    next_help_heading = "Filter settings",
+    mut_args(with_readers),
+    mut_args(with_ranges(FilterSettings::default().entries()))
+)]
 pub struct Overrides {
     /// Settings of all filters.
     #[command(flatten)]
@@ -65,6 +69,17 @@ impl Overrides {
         let mut settings = own;
         self.given.apply(&mut settings);
         settings
+    }
+}
+
+/// Adds the filters that read an option to its help.
+fn with_readers(arg: Arg) -> Arg {
+    match (arg.get_long().map(readers), arg.get_help()) {
+        (Some(filters @ [_, ..]), Some(help)) => {
+            let help = format!("{help} [read by: {}]", filters.join(", "));
+            arg.help(help)
+        }
+        _ => arg,
     }
 }
 
@@ -103,7 +118,8 @@ mod tests {
         let all = command.get_arguments().filter(|a| a.get_action().takes_values());
         let texts: Vec<_> = all.map(|a| a.get_help().unwrap().to_string()).collect();
         assert!(texts.iter().all(|t| t.matches("[default: ").count() == 1), "{texts:#?}");
-        assert!(texts.iter().any(|t| t == "Levels of the wavelet filters [1 to 10] [default: 5]"), "{texts:#?}");
+        let radius = "Pixels from the centre of a window to its border [read by: bilateral, guided, auto] [0 to 4096]";
+        assert!(texts.iter().any(|t| t.starts_with(radius)), "{texts:#?}");
         assert!(texts[0].ends_with("[default: the image's largest] [a finite number above 0]"), "{}", texts[0]);
     }
 

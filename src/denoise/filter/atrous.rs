@@ -39,10 +39,10 @@ settings! {
     pub struct AtrousSettings {
         /// What is given of them.
         AtrousOverrides {
-            /// Which form of the weights atrous uses.
+            /// Form of the weights.
             form: AtrousForm = AtrousForm::Listing, ..;
             // EAW's 1 or 2 are for images of which every 2nd or 4th pixel is known; unknown pixels do without it anyway.
-            /// First level on which atrous looks at radiance.
+            /// First level that looks at radiance.
             rt_from_level: u32 = 0, 0..=FootprintSettings::MAX_LEVELS;
             // So that no light is lost or gained. EAW's own proposal, a channel of weights that normalises the last level
             // alone, kept 0.79 to 1.04 of the light of five images where this keeps all of it, and less than no measure

@@ -7,9 +7,9 @@ settings! {
     pub struct FootprintSettings {
         /// What is given of them.
         FootprintOverrides {
-            /// Levels of the wavelet filters.
+            /// Levels, each of which reaches twice as far as the last; auto takes at most 3.
             levels: u32 = 5, 1..=Self::MAX_LEVELS;
-            /// Pixels from the centre of a window of guided or bilateral to its border.
+            /// Pixels from the centre of a window to its border.
             radius: u32 = 24, 0..=4096;
         }
     }

@@ -27,12 +27,12 @@ pub const ROW: Row = Row {
 const LEAST_DEVIATION: f32 = 1e-30;
 
 settings! {
-    /// What `svgf` alone can be told.
+    /// What `svgf` can be told, and `auto`, which has levels of it.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SvgfSettings {
         /// What is given of them.
         SvgfOverrides {
-            /// Standard deviations of a pixel's luminance that count as an edge for svgf.
+            /// Standard deviations of a pixel's luminance that count as an edge.
             sigma_l: f32 = 4.0, FROM_0;
         }
     }

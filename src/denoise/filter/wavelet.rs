@@ -72,7 +72,7 @@ settings! {
     pub struct WaveletSettings {
         /// What is given of them.
         WaveletOverrides {
-            /// Wavelets of wavelet.
+            /// Wavelets.
             basis: WaveletBasis = WaveletBasis::Cdf22, ..;
         }
     }

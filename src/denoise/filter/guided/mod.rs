@@ -53,17 +53,17 @@ const CHANNELS: Is<u32> = Is("1, 3 or 4", |n| [1, 3, 4].contains(n));
 const EPS: Is<vec4> = Is("finite numbers of 0 or more", |eps| eps.iter().all(|e| e.is_finite() && *e >= 0.0));
 
 settings! {
-    /// What `guided` alone can be told.
+    /// What `guided` can be told, and `auto`, which has windows of it.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct GuidedSettings {
         /// What is given of them.
         GuidedOverrides {
-            /// Channels of guided's guide: 1 (grey normal), 3 (normal) or 4 (normal and depth).
+            /// Channels of the guide: 1 (grey normal), 3 (normal) or 4 (normal and depth).
             channels: u32 = 4, CHANNELS;
             // Normals are halved, depths in units of the extent.
-            /// Variance of the guide below which guided sees no edge: one number, or one per channel.
+            /// Variance of the guide below which there is no edge: one number, or one per channel.
             eps: vec4 = [0.01, 0.01, 0.01, 0.02], EPS, [value_parser = per_channel, allow_hyphen_values = true];
-            /// How guided sums over windows.
+            /// How windows are summed.
             sums: GuidedSums = GuidedSums::Blocks, ..;
         }
     }
