@@ -25,6 +25,7 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/history.glsl"
 #include "shared/whole_pixel.glsl"
 #include "shared/probe_cell.glsl"
+#include "shared/light_around.glsl"
 #include "shared/held.glsl"
 
 // Steps towards where a point was on the last film. Where nothing but the camera moves the first place is exact.

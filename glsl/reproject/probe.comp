@@ -37,6 +37,7 @@ uint nodes_visited = 0u;
 #include "shared/trace_path.glsl"
 #include "shared/history.glsl"
 #include "shared/probe_cell.glsl"
+#include "shared/light_around.glsl"
 
 // One of the cell's pixels that hand on samples, the first from a random one on; NONE where none does.
 uint chosen_pixel(uint cell) {
@@ -72,6 +73,21 @@ vec3 light_from(SurfacePoint at, uint index) {
     return light.direct + light.indirect;
 }
 
+float brightest(vec3 light) { return max(light.r, max(light.g, light.b)); }
+
+// What a path has found, in units of the light around its pixel: beside bright parts of the film, dark ones tell of a change as well. Its
+// own light is a tenth of the unit, so that no path counts for more than ten.
+LightChange share_of_light(vec3 difference, float light, uint pixel) {
+    float unit = max(0.9 * brightest(light_around(pixel, push.constants.size)) + 0.1 * light, 1e-30);
+    vec3 sum = difference / unit;
+    LightChange change = LightChange_zero();
+    change.sum = sum;
+    change.squares = dot(sum, sum);
+    change.light = light / unit;
+    change.count = 1u;
+    return change;
+}
+
 void main() {
     uint i = thread_index();
     if (i >= push.cells) return;
@@ -91,12 +107,7 @@ void main() {
         probes[i].pixel = pixel;
         return;
     }
-    LightChange change = LightChange_zero();
     vec3 difference = light - before.light;
-    change.count = uint(pixel != NONE && finite(difference));
-    change.sum = change.count > 0u ? difference : vec3(0.0);
-    change.squares = dot(change.sum, change.sum);
-    vec3 brightest = max(light, before.light);
-    change.light = change.count > 0u ? max(brightest.r, max(brightest.g, brightest.b)) : 0.0;
-    changes[i] = change;
+    bool counts = pixel != NONE && finite(difference);
+    changes[i] = counts ? share_of_light(difference, brightest(max(light, before.light)), known) : LightChange_zero();
 }

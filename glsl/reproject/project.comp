@@ -29,6 +29,7 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/surface_point.glsl"
 #include "shared/history.glsl"
 #include "shared/probe_cell.glsl"
+#include "shared/light_around.glsl"
 #include "shared/held.glsl"
 
 // Offers the samples of a pixel to those around `film`, a point of the film, of an edge to edges alone. Returns why none takes them,

@@ -1,4 +1,4 @@
-// Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, and before them `previous`, `guide` (of the new
+// Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, light_around.glsl, and before them `previous`, `guide` (of the new
 // frame), `history` and `push` (ReprojectPush).
 
 // A hit is of the surface of a point if it lies no farther from the plane there than this, in widths of a pixel.
@@ -10,17 +10,6 @@ bool shows(uint pixel, Surface s) {
     float off = abs(dot(s.geometric, Guide_position(guide, pixel) - s.position));
     bool near = off <= PLANE_DISTANCE * pixel_width(camera, push.size) * Guide_depth(guide, pixel);
     return near && Guide_object(guide, pixel) == s.object && Guide_material(guide, pixel) == s.material;
-}
-
-// Light of the pixels around one: that of a single pixel would let noise decide, and dark samples would be kept more often.
-vec3 light_around(uint pixel) {
-    ivec2 size = ivec2(push.size), at = ivec2(pixel % push.size.x, pixel / push.size.x);
-    vec3 sum = vec3(0.0);
-    for (int k = 0; k < 9; k++) {
-        ivec2 q = clamp(at + ivec2(k % 3 - 1, k / 3 - 1), ivec2(0), size - 1);
-        sum += History_mean(history, uint(q.y * size.x + q.x));
-    }
-    return sum / 9.0;
 }
 
 // The BSDF towards `wo`, without the cosine, for light from `wi`; both in world space.
@@ -41,7 +30,7 @@ float view_error(Surface s, uint pixel, vec3 before, vec3 after) {
     Bsdf bsdf = surface_bsdf(s);
     if (!bsdf_is_specular(bsdf)) return 0.0;
     float side = dot(s.normal, before) < 0.0 ? -1.0 : 1.0;
-    vec3 irradiance = PI * light_around(pixel) / max(bsdf_albedo(bsdf, abs(dot(s.normal, before))), vec3(LEAST_ALBEDO));
+    vec3 irradiance = PI * light_around(pixel, push.size) / max(bsdf_albedo(bsdf, abs(dot(s.normal, before))), vec3(LEAST_ALBEDO));
     float error = 0.0;
     for (int k = 0; k < 2; k++) {
         vec3 from = mirror(k == 0 ? before : after, side * s.normal);

@@ -79,9 +79,10 @@ gpu_structs! {
         pixel: uint,
     }
 
-    /// How light has changed at the paths of a cell, or of the cells around it, linear Rec. 709. 2 texels.
+    /// How light has changed at the paths of a cell, or of the cells around it, linear Rec. 709, each path in units of the radiance around
+    /// its pixel. 2 texels.
     struct LightChange {
-        /// Sum of the differences of radiance, W/(m^2 sr).
+        /// Sum of the differences of radiance.
         sum: vec3,
         /// Sum of their squared lengths.
         squares: float,

@@ -1,5 +1,5 @@
 //! Twin of `glsl/reproject/probe.comp` and `glsl/reproject/light_change.comp`.
-use crate::layout::{Camera, LightChange, NONE, Probe, SurfacePoint};
+use crate::layout::{Camera, History, LightChange, NONE, Probe, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::shaders::light_change::LEAST_SPACING;
 use crate::shaders::shared::probe_cell::PROBE_CELL;
@@ -52,23 +52,41 @@ pub fn before(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], offered: &
     (0..across * down).map(probe).collect()
 }
 
-/// What has changed on the same paths; `points` as the changed scene numbers them.
-pub fn after(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], probes: &[Probe]) -> Vec<LightChange> {
+/// Pixels of the square of nine around one, those of the border repeated.
+pub(super) fn square(pixel: usize, [width, height]: [u32; 2]) -> impl Iterator<Item = usize> {
+    let [width, height, pixel] = [width as i32, height as i32, pixel as i32];
+    let (x, y) = (pixel % width, pixel / width);
+    (0..9).map(move |k| ((y + k / 3 - 1).clamp(0, height - 1) * width + (x + k % 3 - 1).clamp(0, width - 1)) as usize)
+}
+
+/// Mean radiance of the 3x3 pixels of the last frame around one.
+pub(super) fn light_around(records: &[History], pixel: usize, size: [u32; 2]) -> Vec3 {
+    square(pixel, size).map(|q| Vec3::from(records[q].mean)).sum::<Vec3>() / 9.0
+}
+
+/// A path's difference and the brightest channel of its light, in units of what the pixels around have.
+fn share_of_light(difference: Vec3, light: f32, around: Vec3) -> LightChange {
+    let unit = (0.9 * around.max_element() + 0.1 * light).max(1e-30);
+    let sum = difference / unit;
+    let squares = sum.length_squared();
+    LightChange { sum: sum.into(), squares, light: light / unit, count: 1, ..LightChange::default() }
+}
+
+/// What has changed on the same paths; `records` are those of the last frame, numbered as in the changed scene.
+pub fn after(tracer: &Tracer, eye: &Camera, records: &[History], probes: &[Probe]) -> Vec<LightChange> {
     let size = tracer.frame.path.size;
     let change = |(cell, probe): (u32, &Probe)| {
         if probe.pixel == NONE {
             return LightChange::default();
         }
-        let light = tracer.light_from(points[probe.pixel as usize], eye.position.into(), sample_of(cell, size));
+        let pixel = probe.pixel as usize;
+        let History { triangle, instance, weights, .. } = records[pixel];
+        let point = SurfacePoint { triangle, instance, weights, ..SurfacePoint::default() };
+        let light = tracer.light_from(point, eye.position.into(), sample_of(cell, size));
         let difference = light - Vec3::from(probe.light);
+        let brightest = light.max(probe.light.into()).max_element();
         match difference.is_finite() {
-            true => LightChange {
-                sum: difference.into(),
-                squares: difference.length_squared(),
-                light: light.max(probe.light.into()).max_element(),
-                count: 1,
-                ..LightChange::default()
-            },
+            true => share_of_light(difference, brightest, light_around(records, pixel, size)),
             false => LightChange::default(),
         }
     };

@@ -11,7 +11,7 @@ use crate::shaders::shared::held::{LEAST_ALBEDO, PLANE_DISTANCE};
 use crate::shaders::shared::history::*;
 use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_albedo, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
-use crate::twins::light_change::probe_cell_of;
+use crate::twins::light_change::{light_around, probe_cell_of, square};
 use crate::twins::surface::{Surface, facing_normals, shading_basis, surface_at, surface_bsdf};
 use crate::twins::traverse::Hit;
 use glam::{Vec2, Vec3, Vec4, vec2};
@@ -108,14 +108,6 @@ impl Reprojection<'_> {
         self.push.moved == 0 && self.previous == self.camera
     }
 
-    /// Pixels of the square of nine around one, those of the border repeated.
-    fn around(&self, pixel: usize) -> impl Iterator<Item = usize> + use<> {
-        let [width, height] = self.push.size.map(|n| n as i32);
-        let (x, y) = (pixel as i32 % width, pixel as i32 / width);
-        (0..9)
-            .map(move |k| ((y + k / 3 - 1).clamp(0, height - 1) * width + (x + k % 3 - 1).clamp(0, width - 1)) as usize)
-    }
-
     /// Whether a pixel shows the surface that another shows, whose tangent plane has this normal.
     fn shows_same(&self, [here, other]: [&Guide; 2], plane: Vec3, width: f32) -> bool {
         let off = plane.dot(Vec3::from(other.position) - Vec3::from(here.position)).abs();
@@ -124,14 +116,14 @@ impl Reprojection<'_> {
 
     /// Whether the neighbours of a pixel show the surface that it shows.
     pub fn is_whole(&self, guide: &[Guide], pixel: usize, plane: Vec3, width: f32) -> bool {
-        self.around(pixel).all(|q| self.shows_same([&guide[pixel], &guide[q]], plane, width))
+        square(pixel, self.push.size).all(|q| self.shows_same([&guide[pixel], &guide[q]], plane, width))
     }
 
     /// How many of `count` samples of a pixel at an edge are worth handing on.
     fn kept_of_edge(&self, left: &Left, pixel: usize, plane: Vec3, count: u32) -> u32 {
         let width = pixel_width(&self.previous, self.push.size);
         let (mut sums, mut squares, mut lamp) = ([Vec4::ZERO; 2], 0.0, false);
-        for q in self.around(pixel) {
+        for q in square(pixel, self.push.size) {
             let (s, seen) = (&left.stats[q], &left.guide[q]);
             let same = self.shows_same([&left.guide[pixel], seen], plane, width);
             let (n, mean) = (s.count as f32, Vec3::from(s.mean));
@@ -269,8 +261,8 @@ impl Reprojection<'_> {
     /// By how much the changed view moves a surface's light, whose samples were around `pixel`, in shares of what is allowed.
     pub(super) fn view_change(&self, records: &[History], s: &Surface, pixel: usize) -> f32 {
         let views = [self.previous, self.camera].map(|c| (Vec3::from(c.position) - s.position).normalize());
-        let around: Vec3 = self.around(pixel).map(|q| Vec3::from(records[q].mean)).sum();
-        self.view_error(s, around / 9.0, views[0], views[1]) / self.push.max_error.max(1e-30)
+        self.view_error(s, light_around(records, pixel, self.push.size), views[0], views[1])
+            / self.push.max_error.max(1e-30)
     }
 
     /// How many of a pixel's samples the changed light leaves.

@@ -171,6 +171,7 @@ fn carries_and_goes_on(way: &str) {
 fn effects_of_frames_that_are_not_rendered_change_no_bit() {
     let folder = stage();
     let scene = "[environment]\n[[mesh]]\nshape = 'cube'\nmaterial = 'm'\n\
+                 [[mesh]]\nshape = 'rectangle'\ntransform = { translate = [0, 0, -9], scale = 9 }\n\
                  [[material]]\nname = 'm'\ntype = 'conductor'\nalpha = 0.3\n[camera]\nposition = [0, 1, 4]\ntarget = [0, 0, 0]\n\
                  [[animation]]\ncamera = true\nkeys = [{ time = 0, position = [0, 1, 4] }, { time = 8, position = [1, 1, 4] }]\n\
                  [[animation]]\nmaterial = 'm'\ninterpolation = 'step'\nkeys = [{ time = 0, alpha = 0.001 }, \

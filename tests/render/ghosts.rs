@@ -5,7 +5,7 @@ use crate::support::{self, assert_silent, gpu};
 use crate::twin::Workplace;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Camera, PixelStats};
-use tallow::render::{Outputs, Renderer, Reproject};
+use tallow::render::{Outputs, Renderer, Reproject, carried_samples};
 use tallow::scene::description::{LightTable, Rgb, Transform};
 use tallow::scene::{Loaded, MaterialChange, Pose, Scene};
 
@@ -164,6 +164,52 @@ fn what_brings_no_change_drops_nothing() {
         let found = film.renderer.carriage().unwrap();
         assert!(found.light == 0 && found.hidden < 40 && found.carried > 1100, "{found:?}");
         film.renderer.steps().skip(1).for_each(|step| film.step(&step));
+    }
+    assert_silent(&gpu);
+}
+
+/// Sunlight on a floor, and a bulb in the shade of a slab.
+fn shade() -> Loaded {
+    let mut scene = Workplace::new().scene(
+        "[camera]\nposition = [0.0, 1.6, 5.0]\ntarget = [0.0, 0.9, 0.0]\nfov = 45.0\n[render]\nmax_depth = 3\n\
+         [environment]\nradiance = 0.01\n\
+         [[mesh]]\nshape = 'rectangle'\ntransform = { rotate = [-90.0, 0.0, 0.0], scale = 6.0 }\n\
+         [[mesh]]\nshape = 'cube'\ntransform = { scale = [1.2, 0.05, 1.0], translate = [0.0, 2.5, 0.0] }\n\
+         [[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.0]\nirradiance = 5.0\n\
+         [[light]]\ntype = 'point'\nposition = [0.0, 1.0, 0.0]\nintensity = 0.15\n",
+    );
+    (scene.settings.width, scene.settings.height, scene.settings.spp) = (64, 48, 4);
+    scene
+}
+
+/// Samples that pixels in the shade keep when the bulb goes out, over a few seeds.
+fn kept_in_the_shade(gpu: &Gpu, settings: Reproject) -> u32 {
+    let kept = (1..7).map(|seed| {
+        let mut scene = shade();
+        scene.settings.seed = seed;
+        let mut film = Film::moving(gpu, &scene, settings);
+        (0..3).for_each(|_| film.frame(film.camera));
+        let light: Vec<_> = film.stats().iter().map(|s| s.mean[1]).collect();
+        let (position, intensity) = (Some([0.0, 1.0, 0.0]), Some(Rgb([0.0; 3])));
+        let out = (1, LightTable { position, intensity, ..LightTable::default() });
+        let change = scene.apply(&Pose { lights: vec![out], ..Pose::default() }).unwrap();
+        film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+        film.begin(film.camera);
+        let words = film.carried().into_iter().zip(light);
+        words.filter(|(_, light)| (0.015..0.1).contains(light)).map(|(word, _)| carried_samples(word)).sum::<u32>()
+    });
+    kept.sum()
+}
+
+/// A change counts against the light where it is seen, not against that of brighter parts nearby.
+#[test]
+fn a_bulb_that_goes_out_in_the_shade_leaves_little_beside_sunlight() {
+    let gpu = gpu();
+    for way in WAYS {
+        let settings = by(way);
+        let all = kept_in_the_shade(&gpu, Reproject { reproject_light: 1e9, ..settings });
+        let kept = kept_in_the_shade(&gpu, settings);
+        assert!(all > 3000 && 10 * kept < all, "{way:?}: {kept} of {all} samples are kept");
     }
     assert_silent(&gpu);
 }

@@ -198,8 +198,8 @@ fn appears_vanishes_and_flips(gpu: &Gpu, way: Reprojection) {
     assert!(wrong < 0.015 && off.abs() < 0.02, "{wrong} of pixels wrong, off by {off}");
 
     // Of two updates between frames the second carries nothing.
-    for _ in 0..2 {
-        let pose = pose(&scene, &Moment::default(), 1.4);
+    for scale in [0.5, 1.0] {
+        let pose = pose(&scene, &Moment { scale, ..Moment::default() }, 1.4);
         let change = scene.apply(&pose).unwrap();
         film.record(|renderer, rec| renderer.update(rec, &scene, &change));
     }

@@ -138,12 +138,7 @@ fn both_where_all_moves(
     let (old, old_frame) = lit(&before, frame_of(&before, previous), false);
     let (new, new_frame) = lit(scene, frame_of(scene, camera), true);
     let probes = light_change::before(&tracer(&old, old_frame, effects), &previous, &points, &handed.offered);
-    let moved: Vec<_> = handed
-        .records
-        .iter()
-        .map(|h| SurfacePoint { triangle: h.triangle, instance: h.instance, weights: h.weights, ..Default::default() })
-        .collect();
-    let mut changes = light_change::after(&tracer(&new, new_frame, effects), &previous, &moved, &probes);
+    let mut changes = light_change::after(&tracer(&new, new_frame, effects), &previous, &handed.records, &probes);
     for spacing in SPACINGS {
         changes = light_change::sums(&changes, light_change::probe_cells_of(push.size), spacing);
     }
