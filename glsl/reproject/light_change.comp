@@ -9,8 +9,9 @@ layout(scalar, binding = 1) writeonly buffer Sums { LightChange sums[]; };
 layout(scalar, push_constant) uniform Push { LightChangePush push; };
 
 // Paths that nothing has changed differ by nothing at all, so that every difference is one of light: the question is of how much. In
-// windows of 3x3 cells, where a single path would stand for a ninth of the light, the squared sum loses what a path alone has, and what
-// is left estimates the squared change without bias. Among 81 and 729 paths one counts as it is: it stands for little.
+// windows of 3x3 cells differences count by their size, since a narrow shadow that moves on takes as much light as it gives back. There a
+// single path would stand for a ninth of the light: the squared sum loses what each path alone has. Among 81 and 729 paths one counts as
+// it is, with its sign: it stands for little, and noise cancels.
 const uint LEAST_SPACING = 1u;
 
 void main() {
@@ -24,11 +25,13 @@ void main() {
         LightChange other = LightChange_load(found, uint(q.y * size.x + q.x));
         all.sum += other.sum;
         all.squares += other.squares;
+        all.size += other.size;
         all.light += other.light;
         all.count += other.count;
     }
-    float squared = dot(all.sum, all.sum), own = push.spacing == LEAST_SPACING ? all.squares : 0.0;
-    vec3 change = squared > own ? abs(all.sum) * sqrt(1.0 - own / squared) / all.light : vec3(0.0);
-    all.change = max(LightChange_change(found, i), max(change.r, max(change.g, change.b)));
+    vec3 sum = abs(all.sum);
+    float together = sqrt(max(all.size * all.size - all.squares, 0.0));
+    float change = push.spacing == LEAST_SPACING ? together : max(sum.r, max(sum.g, sum.b));
+    all.change = max(LightChange_change(found, i), change > 0.0 ? change / all.light : 0.0);
     sums[i] = all;
 }

@@ -82,7 +82,8 @@ LightChange share_of_light(vec3 difference, float light, uint pixel) {
     vec3 sum = difference / unit;
     LightChange change = LightChange_zero();
     change.sum = sum;
-    change.squares = dot(sum, sum);
+    change.size = brightest(abs(sum));
+    change.squares = change.size * change.size;
     change.light = light / unit;
     change.count = 1u;
     return change;

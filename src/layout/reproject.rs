@@ -84,7 +84,7 @@ gpu_structs! {
     struct LightChange {
         /// Sum of the differences of radiance.
         sum: vec3,
-        /// Sum of their squared lengths.
+        /// Sum of the squares of `size` of each path.
         squares: float,
         /// Sum of the brightest channels of radiance, before or after, whichever is more.
         light: float,
@@ -92,8 +92,8 @@ gpu_structs! {
         count: uint,
         /// The largest change so far, as a share of the light.
         change: float,
-        /// Makes it two times 16 bytes, as which kernels fetch it.
-        pad: float,
+        /// Sum of the largest channels of the differences' magnitudes.
+        size: float,
     }
 
     /// Push constants of `probe.comp`.

@@ -68,8 +68,8 @@ pub(super) fn light_around(records: &[History], pixel: usize, size: [u32; 2]) ->
 fn share_of_light(difference: Vec3, light: f32, around: Vec3) -> LightChange {
     let unit = (0.9 * around.max_element() + 0.1 * light).max(1e-30);
     let sum = difference / unit;
-    let squares = sum.length_squared();
-    LightChange { sum: sum.into(), squares, light: light / unit, count: 1, ..LightChange::default() }
+    let size = sum.abs().max_element();
+    LightChange { sum: sum.into(), size, squares: size * size, light: light / unit, count: 1, ..LightChange::default() }
 }
 
 /// What has changed on the same paths; `records` are those of the last frame, numbered as in the changed scene.
@@ -104,13 +104,15 @@ pub fn sums(found: &[LightChange], cells: [u32; 2], spacing: u32) -> Vec<LightCh
         for other in inside.map(|[x, y]| &found[(y * width + x) as usize]) {
             all.sum = (Vec3::from(all.sum) + Vec3::from(other.sum)).into();
             all.squares += other.squares;
+            all.size += other.size;
             all.light += other.light;
             all.count += other.count;
         }
-        let sum = Vec3::from(all.sum);
-        let (squared, own) = (sum.length_squared(), if spacing == LEAST_SPACING { all.squares } else { 0.0 });
-        let change =
-            if squared > own { sum.abs().max_element() * (1.0 - own / squared).sqrt() / all.light } else { 0.0 };
+        let size = match spacing {
+            LEAST_SPACING => (all.size * all.size - all.squares).max(0.0).sqrt(),
+            _ => Vec3::from(all.sum).abs().max_element(),
+        };
+        let change = if size > 0.0 { size / all.light } else { 0.0 };
         LightChange { change: found[i as usize].change.max(change), ..all }
     };
     (0..width * height).map(sum).collect()
