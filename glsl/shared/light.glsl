@@ -1,4 +1,4 @@
-// Choice of a light by an alias table in proportion to power, or of some without extent by what they bring, sampling of a point on it, and the densities for MIS.
+// Choice of a light by an alias table in proportion to power, or of point and spot lights by what they bring, sampling of a point on it, and the densities for MIS.
 #include "shared/segment.glsl"
 #include "shared/luminance.glsl"
 
@@ -224,11 +224,11 @@ float spot_share(Light light, vec3 w) {
     return clamp((cut - angle) / max(cut - full, 1e-6), 0.0, 1.0);
 }
 
-bool has_extent(uint kind) { return kind == LIGHT_TRIANGLE || kind == LIGHT_MIRRORED || kind == LIGHT_SPHERE || kind == LIGHT_ENVIRONMENT; }
+bool is_point_or_spot(uint kind) { return kind == LIGHT_POINT || kind == LIGHT_SPOT; }
 
-// What a light without extent brings to a receiver from which it is seen, up to a factor that all have.
+// What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
 float unshadowed(Light light, Receiver r) {
-    vec3 to_light = FX_DIRECTIONAL && light.kind == LIGHT_DIRECTIONAL ? -light.b : light.a - r.position;
+    vec3 to_light = light.a - r.position;
     float d2 = max(dot(to_light, to_light), 1e-30);
     vec3 w = to_light * inversesqrt(d2);
     float cosine = dot(r.normal, w);
@@ -238,15 +238,16 @@ float unshadowed(Light light, Receiver r) {
     return cosine > 0.0 || r.lets_light_through ? brings : 0.0;
 }
 
-// Chooses anew among the lights without extent, one of which the table has chosen: by what each would bring if nothing were in its
-// way (resampling of all candidates: Talbot, Cline and Egbert 2005). They lie before those with a surface.
+// Chooses anew among the point and spot lights, one of which the table has chosen: by what each would bring if nothing were in its way
+// (resampling of all candidates: Talbot, Cline and Egbert 2005). The sun would starve lamps in its shade, so that lights at infinity
+// stay apart, as in pbrt-v4. Lights with a surface lie behind the others.
 Light choose_by_share(Receiver r, float u) {
     Light chosen = Light_load(lights, 0u);
     float sum = 0.0, odds = 0.0, group = 0.0;
     for (uint i = 0u; i < push.constants.light_count; i++) {
         Light light = Light_load(lights, i);
-        if (light.kind == LIGHT_ENVIRONMENT) continue;
-        if (has_extent(light.kind)) break;
+        if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_MIRRORED || light.kind == LIGHT_SPHERE) break;
+        if (!is_point_or_spot(light.kind)) continue;
         group += light.probability;
         float brings = unshadowed(light, r);
         sum += brings;
@@ -271,7 +272,7 @@ LightSample light_sample(Receiver r, uint word, vec2 u) {
     uint count = push.constants.light_count, index = 0u;
     if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, word);
     Light light = Light_load(lights, index);
-    if (FX_WEIGHED_LIGHTS && !has_extent(light.kind)) light = choose_by_share(r, u.x);
+    if (FX_WEIGHED_LIGHTS && is_point_or_spot(light.kind)) light = choose_by_share(r, u.x);
     bool often = light.probability >= SHARP_PROBABILITY;
     if (FX_EMISSIVE && (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_MIRRORED)) {
         sample_triangle_light(p, light, u, s);

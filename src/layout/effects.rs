@@ -147,7 +147,7 @@ effects! {
     large_lamps: FX_LARGE_LAMPS;
     /// Lamps that shine from both sides.
     two_sided_lamps: FX_TWO_SIDED_LAMPS;
-    /// Up to 32 point, spot and directional lights, one of which is chosen by what it would bring.
+    /// From 2 to 32 point and spot lights, one of which is chosen by what it would bring.
     weighed_lights: FX_WEIGHED_LIGHTS;
     /// Exact spheres among the triangles.
     spheres: FX_SPHERES;

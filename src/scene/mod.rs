@@ -94,8 +94,8 @@ pub struct Scene {
     /// animation moves the scene. It stays as the scene was loaded, so that no frame depends on those before it. An engine whose lamps grow
     /// sets it before it makes a renderer; without, the light is the same on average, with more noise near them.
     pub large_lamps: bool,
-    /// Whether one of the point, spot and directional lights is chosen by what each would bring to the point that is lit, as where there are
-    /// from two to 32, be they dark now. It stays as the scene was loaded, too.
+    /// Whether one of the point and spot lights is chosen by what each would bring to the point that is lit, as where there are from two
+    /// to 32, be they dark now. It stays as the scene was loaded, too.
     pub weighed_lights: bool,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,

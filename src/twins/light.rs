@@ -239,12 +239,13 @@ fn spot_share(light: &Light, w: Vec3) -> f32 {
     ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0)
 }
 
-/// What a light without extent brings to a receiver from which it is seen, up to a factor that all have.
+fn is_point_or_spot(light: &Light) -> bool {
+    light.is_delta() && !light.is_far()
+}
+
+/// What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
 fn unshadowed(light: &Light, r: &Receiver) -> f32 {
-    let to_light = match light.kind {
-        LIGHT_DIRECTIONAL => -Vec3::from(light.b),
-        _ => Vec3::from(light.a) - r.position,
-    };
+    let to_light = Vec3::from(light.a) - r.position;
     let d2 = to_light.dot(to_light).max(1e-30);
     let w = to_light / d2.sqrt();
     let cosine = r.normal.dot(w);
@@ -254,12 +255,12 @@ fn unshadowed(light: &Light, r: &Receiver) -> f32 {
     if cosine > 0.0 || r.lets_light_through { brings } else { 0.0 }
 }
 
-/// Chooses anew among the lights without extent, which lie before those with a surface: by what each would bring if nothing were in
+/// Chooses anew among the point and spot lights, which lie before those with a surface: by what each would bring if nothing were in
 /// its way.
 fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
     let (mut chosen, mut sum, mut odds, mut group) = (scene.lights[0], 0.0, 0.0, 0.0);
-    let beside_sky = scene.lights.iter().filter(|l| l.kind != LIGHT_ENVIRONMENT);
-    for light in beside_sky.take_while(|l| l.is_delta()) {
+    let before_surfaces = scene.lights.iter().take_while(|light| !light.has_surface());
+    for light in before_surfaces.filter(|light| is_point_or_spot(light)) {
         group += light.probability;
         let brings = unshadowed(light, r);
         sum += brings;
@@ -295,7 +296,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
     let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
     let (mut light, p) = (&scene.lights[chosen as usize], r.position);
     let weighed;
-    if scene.weighed_lights && light.is_delta() {
+    if scene.weighed_lights && is_point_or_spot(light) {
         weighed = choose_by_share(scene, r, u.x);
         light = &weighed;
     }

@@ -213,15 +213,15 @@ fn what_shines_from_behind_lights_what_lies_there() {
     assert!(inside("").iter().all(|s| s.mean == [0.0; 3]), "control: the front alone");
 }
 
-/// Of lights without extent, light sampling weighs what each brings: what a matt floor gets of a spot, a bulb and two suns, one of them
-/// from below, has no more noise than pixels of the film have width, and that of all is the sum of that of each.
+/// Of point and spot lights, light sampling weighs what each brings: what a matt floor gets of all of them is the sum of that of each,
+/// whichever a sample chooses.
 #[test]
-fn several_lights_without_extent_bring_no_noise() {
+fn several_point_and_spot_lights_bring_no_noise() {
     let lights = [
         "type = 'spot'\nposition = [0.5, 3.0, 0.2]\ntarget = [0.0, 0.0, 0.0]\nintensity = 40.0\ncone = 10.0\ncutoff = 25.0\n",
         "type = 'point'\nposition = [-1.0, 1.5, 0.5]\nintensity = [9.0, 3.0, 1.0]\n",
-        "type = 'directional'\ndirection = [0.3, -1.0, 0.4]\nirradiance = 2.0\n",
-        "type = 'directional'\ndirection = [0.3, 1.0, 0.4]\nirradiance = 50.0\n",
+        "type = 'spot'\nposition = [1.0, 1.0, 0.2]\ntarget = [1.2, 0.0, 1.0]\nintensity = 2.0\ncone = 20.0\ncutoff = 30.0\n",
+        "type = 'point'\nposition = [0.2, -0.5, 0.5]\nintensity = 50.0\n", // below the floor
     ];
     let floor = |lights: &[&str]| {
         let lights: String = lights.iter().map(|light| format!("[[light]]\n{light}")).collect();
@@ -234,8 +234,8 @@ fn several_lights_without_extent_bring_no_noise() {
     let (all, each) = (floor(&lights), lights.map(|light| floor(&[light])));
     for (i, s) in all.iter().enumerate() {
         let sum: f32 = each.iter().map(|one| luminance(one[i].mean)).sum();
-        // Rounding of odds and sums. Lights of another colour than white leave the noise of which of them was chosen.
-        assert!((luminance(s.mean) / sum - 1.0).abs() < 1e-5, "pixel {i}: {} of {sum}", luminance(s.mean));
+        // Rounding, most at the rims of cones. Lights of another colour than white leave the noise of which of them was chosen.
+        assert!((luminance(s.mean) / sum - 1.0).abs() < 1e-3, "pixel {i}: {} of {sum}", luminance(s.mean));
     }
 }
 

@@ -31,7 +31,7 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     choose_unit(scene);
     list(scene)?;
     scene.large_lamps = scene.lights.iter().any(|l| is_large(scene, l));
-    scene.weighed_lights = WEIGHED.contains(&scene.rig.lights.iter().filter(|l| l.is_delta()).count());
+    scene.weighed_lights = WEIGHED.contains(&scene.rig.lights.iter().filter(|l| l.is_delta() && !l.is_far()).count());
     Ok(())
 }
 
@@ -225,7 +225,7 @@ pub fn is_panel(light: &Light) -> bool {
     matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED)
 }
 
-/// How many lights without extent are weighed at every point: it takes time in proportion to their number.
+/// How many point and spot lights are weighed at every point: it takes time in proportion to their number.
 const WEIGHED: RangeInclusive<usize> = 2..=32;
 
 /// How much more often than by their power delta lights are chosen. Lamps and sky are found by BSDF sampling as well, delta lights by
