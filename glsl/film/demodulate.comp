@@ -14,7 +14,7 @@ layout(scalar, binding = 3) writeonly buffer Radiance { vec4 radiance[]; };
 layout(scalar, binding = 4) writeonly buffer Variance { vec3 variance[]; };
 layout(scalar, binding = 5) writeonly buffer Factor { vec4 factor[]; };
 layout(scalar, binding = 6) writeonly buffer Sharp { vec4 sharp[]; };
-layout(scalar, push_constant) uniform Push { SplitPush push; };
+layout(scalar, push_constant) uniform Push { SizePush push; };
 
 // A pixel with less than the share WHOLE of a neighbour's albedo, or more than OUTLIER times its neighbours' median light, may
 // partly show something without albedo.

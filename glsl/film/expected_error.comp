@@ -11,7 +11,7 @@ layout(binding = 3) uniform samplerBuffer variance; // of vec3
 layout(binding = 4) uniform samplerBuffer picture; // of vec4
 layout(binding = 5) uniform samplerBuffer expected; // of vec3
 layout(scalar, binding = 6) writeonly buffer Sums { vec4 sums[]; };
-layout(scalar, push_constant) uniform Push { SplitPush push; };
+layout(scalar, push_constant) uniform Push { SizePush push; };
 
 #include "shared/variance_at.glsl"
 

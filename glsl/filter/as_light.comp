@@ -5,7 +5,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
 layout(scalar, binding = 1) buffer Output { vec4 filtered[]; };
-layout(scalar, push_constant) uniform Push { SplitPush push; };
+layout(scalar, push_constant) uniform Push { SizePush push; };
 
 const int REACH = 3; // pixels from the centre to the border of the window
 

@@ -6,7 +6,7 @@ use super::sparse::Sparse;
 use super::{Demodulation, ExpectedError, Holds, Noisy};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{PackPush, SplitPush, vec3, vec4};
+use crate::layout::{PackPush, SizePush, vec3, vec4};
 use crate::shaders::shared::noisy;
 use crate::shaders::{demodulate, demodulate_direct, remodulate, remodulate_direct};
 
@@ -99,7 +99,7 @@ impl Demodulated {
             factor: &self.factor,
             sharp: &self.picture,
         };
-        rec.dispatch_threads(&self.split, bind, &SplitPush { size, ..Default::default() }, count)?;
+        rec.dispatch_threads(&self.split, bind, &SizePush { size, ..Default::default() }, count)?;
         if let Some(sparse) = &self.sparse {
             sparse.record_decimate(rec, planes, uncut)?;
         }

@@ -4,7 +4,7 @@ use super::filter::Planes;
 use super::twin::Parts;
 use crate::error::Result;
 use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
-use crate::layout::{SplitPush, vec3, vec4};
+use crate::layout::{SizePush, vec3, vec4};
 use crate::shaders::expected_error::{Bind, EACH, EPSILON, THREADS};
 use glam::Vec3;
 use serde::Serialize;
@@ -44,7 +44,7 @@ impl ExpectedError {
         let kernel = Kernel::new(gpu, &Default::default())?;
         let (radiance, filtered) = (&planes.radiance, &planes.output);
         let bind = Bind { radiance, filtered, factor, variance, picture, expected, sums: &sums };
-        let push = SplitPush { size: planes.size, ..Default::default() };
+        let push = SizePush { size: planes.size, ..Default::default() };
         gpu.run(&mut FrameResources::new(gpu)?, |rec| rec.dispatch(&kernel, bind, &push, [groups, 1, 1]))?;
         Ok(Self::of_sums(&sums.read()?))
     }

@@ -3,8 +3,8 @@ use super::{Field, Struct, float, uint, uvec2, vec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
-    /// Push constants of `demodulate.comp` and `as_light.comp`.
-    struct SplitPush {
+    /// Push constants of `demodulate.comp`, `as_light.comp` and `expected_error.comp`.
+    struct SizePush {
         /// Film in pixels.
         size: uvec2,
     }

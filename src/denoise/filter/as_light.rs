@@ -3,7 +3,7 @@ use super::pixel::known_radiance;
 use super::{FilterInput, Planes};
 use crate::error::Result;
 use crate::gpu::{Gpu, Kernel, Recorder};
-use crate::layout::{SplitPush, vec4};
+use crate::layout::{SizePush, vec4};
 use crate::shaders::as_light::{Bind, REACH};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
@@ -25,7 +25,7 @@ impl AsLight {
     /// [`crate::error::Error::Device`] when the image is too large for the device.
     pub fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let bind = Bind { radiance: &planes.radiance, filtered: &planes.output };
-        let push = SplitPush { size: planes.size, ..Default::default() };
+        let push = SizePush { size: planes.size, ..Default::default() };
         rec.dispatch(&self.0, bind, &push, self.0.groups(planes.size))
     }
 }
