@@ -10,12 +10,12 @@ fn open(json: &Value) -> SceneFile<'static> {
     SceneFile::open(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn load(json: &Value) -> Loaded {
+pub fn load(json: &Value) -> Loaded {
     open(json).load().unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Adds an accessor of floats; returns its index.
-fn add(json: &mut Value, numbers: &[f32], kind: &str) -> usize {
+pub fn add(json: &mut Value, numbers: &[f32], kind: &str) -> usize {
     let width = match kind {
         "VEC3" => 3,
         "VEC4" => 4,

@@ -7,8 +7,10 @@ mod files;
 mod gltf;
 mod gltf_allowed;
 mod gltf_bad;
+mod gltf_deformed;
 #[path = "../support/gltf.rs"]
 mod gltf_file;
+mod gltf_materials;
 mod gltf_motion;
 mod memory;
 mod models;
