@@ -21,6 +21,7 @@ mod poses;
 mod relief;
 mod reproject;
 mod shown;
+mod sky;
 mod sphere;
 mod stability;
 #[path = "../support/mod.rs"]

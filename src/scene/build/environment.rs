@@ -185,6 +185,13 @@ mod tests {
         assert!((e.texels.iter().map(|t| t[3]).sum::<f32>() - 1.0).abs() < 1e-6);
     }
 
+    /// The sines of 22.5 and 67.5 degrees are to each other as sqrt 2 - 1 to 1.
+    #[test]
+    fn the_mean_counts_rows_by_solid_angle() {
+        let e = grey(2, 4, |_, y| [1.0, 3.0, 3.0, 1.0][y as usize]);
+        assert!((mean_luminance(&e) - (1.0 + 2f64.sqrt())).abs() < 1e-6, "{}", mean_luminance(&e));
+    }
+
     #[test]
     fn the_neighbours_of_a_sun_are_drawn_too_across_the_seam() {
         let e = grey(8, 6, |x, y| if (x, y) == (0, 3) { 100.0 } else { 0.0 });
