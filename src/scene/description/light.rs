@@ -105,3 +105,32 @@ fn emitted(v: Option<Rgb>, key: &str, most: f32) -> Result<[f32; 3], String> {
         false => Err(format!("{key} {v:?} is negative, NaN or above {most:e}")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cones_have_the_defaults_that_are_documented() {
+        for (given, expected) in [
+            ([None, None], [15.0, 20.0]),
+            ([None, Some(60.0)], [45.0, 60.0]),
+            ([Some(5.0), None], [5.0, 20.0]),
+            ([Some(0.0), Some(180.0)], [0.0, 180.0]),
+        ] {
+            let ([cone, cutoff], axis) = (given, Some([0.0, 0.0, -1.0]));
+            let (position, intensity) = (Some([0.0; 3]), Some(Rgb([1.0; 3])));
+            let table = LightTable {
+                kind: Type::Spot,
+                position,
+                direction: axis,
+                intensity,
+                cone,
+                cutoff,
+                ..Default::default()
+            };
+            let [full, dark, _] = table.build().unwrap().c;
+            assert_eq!([full, dark], expected.map(|degrees: f32| degrees.to_radians().cos()), "{given:?}");
+        }
+    }
+}
