@@ -294,8 +294,8 @@ mod tests {
 
     #[test]
     fn tiles_are_whole_windows_whichever_limit_is_the_least() {
-        // 48 bytes a pixel, 64 pixels at a time.
-        let pixels = |bytes: u64| (bytes / 48 / 64 * 64) as u32;
+        // The bytes of a guide a pixel, 64 pixels at a time.
+        let pixels = |bytes: u64| (bytes / size_of::<Guide>() as u64 / 64 * 64) as u32;
         assert_eq!(whole_windows(1 << 31, 1 << 27), [16 * pixels(1 << 27), pixels(1 << 27)], "lavapipe");
         assert_eq!(whole_windows(1 << 31, 1 << 32), [pixels(1 << 31); 2], "buffers end before bindings do");
         assert_eq!(whole_windows(u64::MAX, u64::MAX), [1 << 28; 2]);
