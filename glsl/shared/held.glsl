@@ -1,5 +1,5 @@
-// Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, light_around.glsl, and before them `previous`, `guide` (of the new
-// frame), `history` and `push` (ReprojectPush).
+// Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, light_around.glsl, and before them `previous`,
+// `guide` (of the new frame), `history` and `push` (ReprojectPush).
 
 // A hit is of the surface of a point if it lies no farther from the plane there than this, in widths of a pixel.
 const float PLANE_DISTANCE = 0.5;

@@ -1,4 +1,5 @@
-// Choice of a light by an alias table in proportion to power, or of point and spot lights by what they bring, sampling of a point on it, and the densities for MIS.
+// Choice of a light by an alias table in proportion to power, or of point and spot lights by what they bring, sampling of a point on
+// it, and the densities for MIS.
 #include "shared/segment.glsl"
 #include "shared/luminance.glsl"
 

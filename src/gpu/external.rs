@@ -46,8 +46,8 @@ pub struct RawDevice {
 }
 
 impl Gpu {
-    /// Uses a device made elsewhere and destroys only what it makes itself. [`Gpu::calibrate`] works if the device has VK_KHR_calibrated_timestamps or
-    /// VK_EXT_calibrated_timestamps enabled.
+    /// Uses a device made elsewhere and destroys only what it makes itself. [`Gpu::calibrate`] works if the device has
+    /// VK_KHR_calibrated_timestamps or VK_EXT_calibrated_timestamps enabled.
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.

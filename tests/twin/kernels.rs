@@ -46,8 +46,8 @@ pub fn shipped(file: &str) -> Loaded {
         .unwrap()
 }
 
-/// Textures of every use, masks (of the lamp too, which shines from behind), a normal map, an environment image, a spot light, a lens, a mirrored
-/// instance, roulette and a clamp.
+/// Textures of every use, masks (of the lamp too, which shines from behind), a normal map, an environment image, a spot light, a
+/// lens, a mirrored instance, roulette and a clamp.
 pub fn pictures() -> Loaded {
     let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
