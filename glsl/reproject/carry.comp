@@ -40,7 +40,11 @@ void main() {
             l.indirect_m2 = still ? taken.indirect_variance : taken.indirect_variance * freedom(c.count);
         }
         bool inside = (key >> PIXEL_BITS & FARTHEST) <= FARTHEST / 2u;
-        if (c.count >= push.spp && inside) points[i] = SurfacePoint(h.triangle, h.instance, h.weights);
+        if (c.count >= push.spp && inside) {
+            points[i].triangle = h.triangle;
+            points[i].instance = h.instance;
+            points[i].weights = h.weights;
+        }
     }
     stats[i] = PixelStats_words(s);
     if (FX_SPLIT) light[i] = PixelLight_words(l);

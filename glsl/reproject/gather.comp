@@ -137,10 +137,14 @@ void main() {
         word = texelFetch(offered, int(pixel)).x;
         if (carried_of(word).count > 0u) {
             History h = History_load(history, pixel);
-            m.stats = PixelStats(h.mean, carried_of(word).count, h.variance, 0u);
+            m.stats.mean = h.mean;
+            m.stats.count = carried_of(word).count;
+            m.stats.m2 = h.variance;
             if (FX_SPLIT) {
                 HistoryLight l = HistoryLight_load(history_light, pixel);
-                m.light = PixelLight(l.direct, l.indirect_variance, l.albedo, 0u);
+                m.light.direct = l.direct;
+                m.light.indirect_m2 = l.indirect_variance;
+                m.light.albedo = l.albedo;
             }
         }
     } else {

@@ -153,9 +153,19 @@ void main() {
     at = numbered_anew(at);
     // Where nothing moves sums are handed on as they are, but for samples that MOST_CARRIED leaves out.
     float share = still ? freedom(c.count) / freedom(s.count) : 1.0, divisor = still ? 1.0 : freedom(s.count);
-    history[i] = History_words(History(at.triangle, at.instance, at.weights, s.mean, s.m2 * share / divisor, uvec2(0u)));
+    History h = History_zero();
+    h.triangle = at.triangle;
+    h.instance = at.instance;
+    h.weights = at.weights;
+    h.mean = s.mean;
+    h.variance = s.m2 * share / divisor;
+    history[i] = History_words(h);
     if (FX_SPLIT) {
         PixelLight l = PixelLight_load(light, pixel);
-        history_light[i] = HistoryLight_words(HistoryLight(l.direct, l.albedo, l.indirect_m2 * share / divisor, 0u));
+        HistoryLight h = HistoryLight_zero();
+        h.direct = l.direct;
+        h.albedo = l.albedo;
+        h.indirect_variance = l.indirect_m2 * share / divisor;
+        history_light[i] = HistoryLight_words(h);
     }
 }

@@ -40,5 +40,9 @@ void main() {
     Guide shown = seen_hit(ray, pcg(pixel), guide, hit, kept);
     guides[i] = guide;
     if (FX_SMOOTH) seen[i] = shown;
-    if (POINTS) points[i] = SurfacePoint(hit.triangle, hit.instance, vec2(hit.b1, hit.b2));
+    if (POINTS) {
+        points[i].triangle = hit.triangle;
+        points[i].instance = hit.instance;
+        points[i].weights = vec2(hit.b1, hit.b2);
+    }
 }
