@@ -26,6 +26,9 @@ pub struct Args {
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
+    /// Say what is on and what calls for it, and measure nothing: needs no device
+    #[arg(long, conflicts_with = "device")]
+    pub no_measure: bool,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
@@ -58,7 +61,7 @@ pub struct EffectRow {
     /// Time in ms to compile the pipelines with the effect, less that without it; 0 if there is no measurable difference.
     pub compile_ms: Option<f64>,
     /// Bytes of device memory that the effect adds: records of the scene that nothing else reads, and buffers of the render.
-    pub bytes: u64,
+    pub bytes: Option<u64>,
 }
 
 /// Runs the subcommand in a process whose drivers cache no compiled kernels, because a cache would hide the cost of
@@ -67,22 +70,24 @@ pub struct EffectRow {
 /// # Errors
 /// As a render of the scene.
 pub fn run(args: &Args) -> Result<Exit> {
-    if COLD.iter().any(|(name, value)| std::env::var(name).as_deref() != Ok(*value)) {
+    let is_cold = || COLD.iter().all(|(name, value)| std::env::var(name).as_deref() == Ok(*value));
+    if !args.no_measure && !is_cold() {
         return run_cold();
     }
-    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
-    let pixels = PIXELS_BY_KIND[usize::from(gpu.info().kind != DeviceKind::Cpu)];
     let mut file = SceneFile::open(&args.scene)?;
     file.stays_still();
-    let scene = file.load()?.with(|s| shrink(s, pixels));
+    let scene = file.load()?;
     let warnings = scene.warnings.clone();
     if !args.json {
         warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
-    let effects = rows(args, &scene)?;
+    let mut effects = listed(&args.effects, &scene)?;
+    if !args.no_measure {
+        measure(&mut effects, args, scene)?;
+    }
     match args.json {
         true => print_json(&Report { effects, warnings })?,
-        false => print(&text(&effects))?,
+        false => print(&text(&effects, !args.no_measure))?,
     }
     Ok(Exit::Done)
 }
@@ -156,56 +161,56 @@ impl Variant {
     }
 }
 
-fn rows(args: &Args, scene: &Loaded) -> Result<Vec<EffectRow>> {
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let (base, reasons) = scene::effects(scene, &scene.settings, outputs.split_light, outputs.counters);
-    let called_for_by = |effect| reasons.iter().find(|(of, _)| *of == effect).map_or("", |(_, by)| by).to_owned();
-    let names: Vec<_> = Effect::ALL.iter().map(|effect| effect.name()).chain([GUIDES]).collect();
-    if let Some(unknown) = args.effects.iter().find(|name| !names.contains(&name.as_str())) {
+/// What an EXR file of all layers calls for.
+const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
+
+/// The effects that are named, or all, without their costs.
+fn listed(named: &[String], scene: &Loaded) -> Result<Vec<EffectRow>> {
+    let (base, reasons) = scene::effects(scene, &scene.settings, OUTPUTS.split_light, OUTPUTS.counters);
+    let reason = |effect| reasons.iter().find(|(of, _)| *of == effect).map_or("", |(_, by)| by).to_owned();
+    let effects = Effect::ALL.iter().zip(base.switches()).map(|(&e, on)| (e.name(), on, reason(e)));
+    let all: Vec<_> = effects.chain([(GUIDES, true, "an output that keeps primary hits".to_owned())]).collect();
+    let names: Vec<_> = all.iter().map(|(name, ..)| *name).collect();
+    if let Some(unknown) = named.iter().find(|name| !names.contains(&name.as_str())) {
         return Err(Error::Usage(format!("no effect \"{unknown}\": choose of {}", names.join(", "))));
     }
-    let wanted = |name: &str| args.effects.is_empty() || args.effects.iter().any(|effect| effect == name);
-    let bar = ProgressBar::new(names.iter().filter(|name| wanted(name)).count() as u64);
-    let usual = || Variant::new(args, scene, outputs, base);
+    let wanted = all.into_iter().filter(|(name, ..)| named.is_empty() || named.iter().any(|effect| effect == name));
+    let row = |(effect, on, called_for_by)| EffectRow { effect, on, called_for_by, ..EffectRow::default() };
+    Ok(wanted.map(row).collect())
+}
+
+/// Measures what each of the rows costs, in a small render of the scene.
+fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<()> {
+    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
+    let pixels = PIXELS_BY_KIND[usize::from(gpu.info().kind != DeviceKind::Cpu)];
+    let scene = scene.with(|settings| shrink(settings, pixels));
+    let (base, _) = scene::effects(&scene, &scene.settings, OUTPUTS.split_light, OUTPUTS.counters);
+    let usual = || Variant::new(args, &scene, OUTPUTS, base);
     let first = usual()?.cost.compile_ms;
     let mut usual = usual()?;
     usual.cost.compile_ms = usual.cost.compile_ms.min(first);
-    let mut price = |(effect, on): (&'static str, bool), outputs_then, effects_then| {
-        let (usual, other, pairs) = beside(&mut usual, || Variant::new(args, scene, outputs_then, effects_then))?;
-        let (with, without) = if on { (usual, other) } else { (other, usual) };
-        let added = |[usual, other]: [f64; 2]| if on { usual - other } else { other - usual };
-        let Estimate { low, high, .. } = interval::median(&pairs.into_iter().map(added).collect::<Vec<_>>(), 0.95);
-        bar.inc(1);
-        Ok::<_, Error>(EffectRow {
-            effect,
-            on,
-            called_for_by: String::new(),
-            gpu_ms_with: Some(with.gpu_ms),
-            gpu_ms_without: Some(without.gpu_ms),
-            gpu_ms_added: low.zip(high).map(<[f64; 2]>::from),
-            compile_ms: Some((with.compile_ms - without.compile_ms).max(0.0)),
-            bytes: with.bytes.saturating_sub(without.bytes),
-        })
-    };
-    let mut rows = Vec::new();
-    let effects = Effect::ALL.iter().copied().zip(base.switches());
-    for (effect, on) in effects.filter(|(effect, _)| wanted(effect.name())) {
-        let then = base.toggled(effect);
-        let outputs_then = Outputs { split_light: then.split_light, counters: then.counters, ..outputs };
-        let row = price((effect.name(), on), outputs_then, then)?;
-        let bytes = row.bytes + scene_bytes(effect, scene);
-        let row = EffectRow { called_for_by: called_for_by(effect), bytes, ..row };
+    let bar = ProgressBar::new(rows.len() as u64);
+    for row in rows {
+        let effect = Effect::ALL.iter().copied().find(|effect| effect.name() == row.effect);
+        let then = effect.map_or(base, |effect| base.toggled(effect));
+        let guides = effect.is_some();
+        let outputs = Outputs { split_light: then.split_light, guides, counters: then.counters };
+        let (usual, other, pairs) = beside(&mut usual, || Variant::new(args, &scene, outputs, then))?;
+        let (with, without) = if row.on { (usual, other) } else { (other, usual) };
+        let bytes = with.bytes.saturating_sub(without.bytes);
+        row.bytes = Some(bytes + effect.map_or(0, |effect| scene_bytes(effect, &scene)));
         // With and without it are different renders and not one picture at two costs; `tools/papers policies` compares them.
-        let unknown =
-            EffectRow { gpu_ms_with: None, gpu_ms_without: None, gpu_ms_added: None, compile_ms: None, ..row.clone() };
-        rows.push(if effect == Effect::adaptive { unknown } else { row });
-    }
-    if wanted(GUIDES) {
-        let guides = price((GUIDES, true), Outputs { guides: false, ..outputs }, base)?;
-        rows.push(EffectRow { called_for_by: "an output that keeps primary hits".to_owned(), ..guides });
+        if effect != Some(Effect::adaptive) {
+            let added = |[usual, other]: [f64; 2]| if row.on { usual - other } else { other - usual };
+            let Estimate { low, high, .. } = interval::median(&pairs.into_iter().map(added).collect::<Vec<_>>(), 0.95);
+            [row.gpu_ms_with, row.gpu_ms_without] = [with, without].map(|cost| Some(cost.gpu_ms));
+            row.gpu_ms_added = low.zip(high).map(<[f64; 2]>::from);
+            row.compile_ms = Some((with.compile_ms - without.compile_ms).max(0.0));
+        }
+        bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(rows)
+    Ok(())
 }
 
 /// Times that each variant runs beside the usual one, at least and at most: where other programs use the machine, until its two
@@ -322,24 +327,23 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
     bytes as u64
 }
 
-/// Formats the rows as a table, with a dash for costs that were not measured.
-pub fn text(rows: &[EffectRow]) -> String {
+/// Formats the rows as a table, with a dash for costs that are not known, or, where none was `measured`, without their columns.
+pub fn text(rows: &[EffectRow], measured: bool) -> String {
     let ms = |value: Option<f64>| value.map_or("-".to_owned(), milliseconds);
-    let cells = |r: &EffectRow| {
-        vec![
-            r.effect.to_owned(),
-            if r.on { "on" } else { "off" }.to_owned(),
-            ms(r.gpu_ms_with),
-            ms(r.gpu_ms_without),
-            r.gpu_ms_added
-                .map_or("-".to_owned(), |[low, high]| format!("{} to {}", milliseconds(low), milliseconds(high))),
-            ms(r.compile_ms),
-            r.bytes.to_string(),
-            readable(&r.called_for_by),
-        ]
+    let costs = |r: &EffectRow| {
+        let added = |[low, high]: [f64; 2]| format!("{} to {}", milliseconds(low), milliseconds(high));
+        let added = r.gpu_ms_added.map_or("-".to_owned(), added);
+        let bytes = r.bytes.map_or("-".to_owned(), |bytes| bytes.to_string());
+        [ms(r.gpu_ms_with), ms(r.gpu_ms_without), added, ms(r.compile_ms), bytes]
     };
-    let header =
-        ["effect", "", "GPU ms with", "GPU ms without", "GPU ms added", "compile ms", "bytes", "called for by"];
+    let cells = |r: &EffectRow| {
+        let state = if r.on { "on" } else { "off" };
+        let costs = measured.then(|| costs(r)).into_iter().flatten();
+        [r.effect, state].map(str::to_owned).into_iter().chain(costs).chain([readable(&r.called_for_by)]).collect()
+    };
+    let costs = ["GPU ms with", "GPU ms without", "GPU ms added", "compile ms", "bytes"];
+    let costs = measured.then_some(costs).into_iter().flatten();
+    let header: Vec<_> = ["effect", ""].into_iter().chain(costs).chain(["called for by"]).collect();
     table::text(&header, &rows.iter().map(cells).collect::<Vec<_>>())
 }
 
@@ -367,11 +371,20 @@ mod tests {
 
     #[test]
     fn costs_not_measured_are_dashes() {
-        let on =
-            EffectRow { effect: "ggx", on: true, called_for_by: "vase".to_owned(), bytes: 64, ..EffectRow::default() };
-        let table = text(&[on, EffectRow { effect: "lens", ..EffectRow::default() }]);
-        let last = |line: usize| table.lines().nth(line).unwrap().split_whitespace().collect::<Vec<_>>();
-        assert_eq!(last(1), ["ggx", "on", "-", "-", "-", "-", "64", "vase"]);
-        assert_eq!(last(2), ["lens", "off", "-", "-", "-", "-", "0"]);
+        let on = EffectRow {
+            effect: "ggx",
+            on: true,
+            called_for_by: "vase".to_owned(),
+            bytes: Some(64),
+            ..EffectRow::default()
+        };
+        let rows = [on, EffectRow { effect: "lens", ..EffectRow::default() }];
+        let words = |table: &str, line: usize| {
+            table.lines().nth(line).unwrap().split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+        };
+        let table = text(&rows, true);
+        assert_eq!(words(&table, 1), ["ggx", "on", "-", "-", "-", "-", "64", "vase"]);
+        assert_eq!(words(&table, 2), ["lens", "off", "-", "-", "-", "-", "-"]);
+        assert_eq!(words(&text(&rows, false), 1), ["ggx", "on", "vase"]);
     }
 }

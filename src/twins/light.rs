@@ -239,10 +239,6 @@ fn spot_share(light: &Light, w: Vec3) -> f32 {
     ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0)
 }
 
-fn is_point_or_spot(light: &Light) -> bool {
-    light.is_delta() && !light.is_far()
-}
-
 /// What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
 fn unshadowed(light: &Light, r: &Receiver) -> f32 {
     let to_light = Vec3::from(light.a) - r.position;
@@ -260,7 +256,7 @@ fn unshadowed(light: &Light, r: &Receiver) -> f32 {
 fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
     let (mut chosen, mut sum, mut odds, mut group) = (scene.lights[0], 0.0, 0.0, 0.0);
     let before_surfaces = scene.lights.iter().take_while(|light| !light.has_surface());
-    for light in before_surfaces.filter(|light| is_point_or_spot(light)) {
+    for light in before_surfaces.filter(|light| light.is_point_or_spot()) {
         group += light.probability;
         let brings = unshadowed(light, r);
         sum += brings;
@@ -296,7 +292,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
     let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
     let (mut light, p) = (&scene.lights[chosen as usize], r.position);
     let weighed;
-    if scene.weighed_lights && is_point_or_spot(light) {
+    if scene.weighed_lights && light.is_point_or_spot() {
         weighed = choose_by_share(scene, r, u.x);
         light = &weighed;
     }

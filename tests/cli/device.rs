@@ -35,6 +35,23 @@ fn no_loader_and_no_driver_are_told_apart() {
     fails(&folder, &[], &["no Vulkan loader", "libvulkan1"]);
 }
 
+#[test]
+fn effects_are_listed_without_a_driver() {
+    let folder = tempfile::tempdir().unwrap();
+    let explain = |words: &str| {
+        let mut command = command(folder.path(), &format!("explain {} --json {words}", scene()));
+        command.env("VK_DRIVER_FILES", "/nothing.json").env("VK_ICD_FILENAMES", "/nothing.json").output().unwrap()
+    };
+    complains(&explain(""), 4, &["no Vulkan driver"]);
+    let document: serde_json::Value = serde_json::from_str(&stdout(&explain("--no-measure"))).unwrap();
+    let rows = document["effects"].as_array().unwrap();
+    let row = |name| rows.iter().find(|row| row["effect"] == name).unwrap();
+    let [emissive, textures] = ["emissive", "textures"].map(row);
+    assert_eq!((&emissive["on"], &emissive["called_for_by"]), (&true.into(), &"material \"light\"".into()));
+    assert_eq!((&textures["on"], &textures["bytes"]), (&false.into(), &serde_json::Value::Null));
+    assert!(rows.iter().any(|row| row["effect"] == "guides"));
+}
+
 /// The Vulkan loader that programs get.
 fn loader() -> PathBuf {
     let _gpu = Gpu::open(&DeviceOptions::default()).unwrap();

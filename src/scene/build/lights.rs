@@ -31,7 +31,7 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     choose_unit(scene);
     list(scene)?;
     scene.large_lamps = scene.lights.iter().any(|l| is_large(scene, l));
-    scene.weighed_lights = WEIGHED.contains(&scene.rig.lights.iter().filter(|l| l.is_delta() && !l.is_far()).count());
+    scene.weighed_lights = WEIGHED.contains(&scene.rig.lights.iter().filter(|l| l.is_point_or_spot()).count());
     Ok(())
 }
 
