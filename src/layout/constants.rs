@@ -90,7 +90,7 @@ constants! {
     LIGHT_TRIANGLE: uint = 0;
     /// [`Light::kind`]: point at `a`, radiant intensity `value` in W/sr.
     LIGHT_POINT: uint = 1;
-    /// [`Light::kind`]: spot at `a` along unit `b`; `c` = (cos of the full-intensity angle, cos of the cut-off angle, 0).
+    /// [`Light::kind`]: spot at `a` along unit `b`; `c` = (the angle of full intensity, that of the cut-off, 0), in radians.
     LIGHT_SPOT: uint = 2;
     /// [`Light::kind`]: directional along unit `b` (the way light travels), irradiance `value` on a facing plane.
     LIGHT_DIRECTIONAL: uint = 3;

@@ -147,8 +147,10 @@ effects! {
     large_lamps: FX_LARGE_LAMPS;
     /// Lamps that shine from both sides.
     two_sided_lamps: FX_TWO_SIDED_LAMPS;
-    /// From 2 to 32 point and spot lights, one of which is chosen by what it would bring.
+    /// Up to 32 point and spot lights, one of which is chosen by what it would bring.
     weighed_lights: FX_WEIGHED_LIGHTS;
+    /// Many lights within the scene: one of several candidates is chosen by what it would bring.
+    resampled_lights: FX_RESAMPLED_LIGHTS;
     /// Exact spheres among the triangles.
     spheres: FX_SPHERES;
     /// What lamps and sky bring to the first hit goes with indirect light.

@@ -338,8 +338,8 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     let independent_sampler = settings.sampler == Sampler::Independent;
     // Lamps and sky may come to shine later.
     let soft_light = settings.split == Split::Soft;
-    let Scene { large_lamps, weighed_lights, .. } = *scene;
-    Effects { independent_sampler, large_lamps, weighed_lights, soft_light, ..Effects::ALL }
+    let Scene { large_lamps, weighed_lights, resampled_lights, .. } = *scene;
+    Effects { independent_sampler, large_lamps, weighed_lights, resampled_lights, soft_light, ..Effects::ALL }
 }
 
 /// Paths per dispatch, whose samples, or what a wavefront keeps of them, have room.

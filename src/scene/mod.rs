@@ -94,9 +94,11 @@ pub struct Scene {
     /// animation moves the scene. It stays as the scene was loaded, so that no frame depends on those before it. An engine whose lamps grow
     /// sets it before it makes a renderer; without, the light is the same on average, with more noise near them.
     pub large_lamps: bool,
-    /// Whether one of the point and spot lights is chosen by what each would bring to the point that is lit, as where there are from two
-    /// to 32, be they dark now. It stays as the scene was loaded, too.
+    /// Whether one of the point and spot lights is chosen by what each would bring to the point that is lit, as where there are from two,
+    /// be they dark now, to 32 that shine. It stays as the scene was loaded, too.
     pub weighed_lights: bool,
+    /// Whether lamps are chosen from several that the table has chosen, by what each would bring, as where there are many. It stays, too.
+    pub resampled_lights: bool,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
     /// Fingerprint of all that decides the picture but camera and settings, in the order of the files. Triangles are added before

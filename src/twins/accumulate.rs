@@ -1,6 +1,6 @@
 //! Twin of `glsl/film/accumulate.comp`: Welford's running mean and variance (1962), in order of sample index.
 use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
-use crate::math::hash::pcg;
+use crate::math::hash::{pcg, unit_interval};
 use crate::math::srgb::luminance;
 use crate::shaders;
 use crate::shaders::accumulate::{MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
@@ -89,7 +89,7 @@ fn move_channel(mean: f32, by: f32, remainder: &mut Kept, at: u32, bits: u32) ->
     let moved = mean + added;
     let lost = added - (moved - mean);
     let end = (1 << (bits - 1)) as f32;
-    let up = (pcg(remainder.count) >> 8) as f32 * 5.960_464_5e-8;
+    let up = unit_interval(pcg(remainder.count));
     let rounded = (lost / unit(moved, bits) + up).floor();
     // A remainder of half the last place or more moves the mean to the next number: cutting it off would bias the mean.
     let (moved, rounded) = match rounded >= end {

@@ -1,10 +1,12 @@
 //! Twin of `glsl/shared/light.glsl`.
 use crate::layout::*;
-use crate::math::hash::pcg;
+use crate::math::hash::{pcg, unit_interval};
 use crate::math::srgb::luminance;
 use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
-use crate::shaders::shared::light::{BELOW_ONE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
+use crate::shaders::shared::light::{
+    BELOW_ONE, BOOST, CANDIDATES, EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY,
+};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
@@ -234,33 +236,60 @@ fn is_sharp(light: &Light) -> bool {
 
 /// Share of a spot's intensity along `w`, from the point that it lights.
 fn spot_share(light: &Light, w: Vec3) -> f32 {
-    let angle = (-Vec3::from(light.b).dot(w)).clamp(-1.0, 1.0).acos();
-    let (full, cut) = (light.c[0].acos(), light.c[1].acos());
+    let axis = Vec3::from(light.b);
+    let angle = axis.cross(w).length().atan2(-axis.dot(w));
+    let [full, cut, _] = light.c;
     ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0)
 }
 
-/// What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
-fn unshadowed(light: &Light, r: &Receiver) -> f32 {
-    let to_light = Vec3::from(light.a) - r.position;
-    let d2 = to_light.dot(to_light).max(1e-30);
+/// What a light that is not infinitely far away brings to a receiver from which it is seen, up to a factor that all have.
+fn unshadowed(scene: &Scene, light: &Light, r: &Receiver) -> f32 {
+    let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
+    let (e1, e2) = (b - a, c - a);
+    let is_panel = matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED);
+    let (middle, extent2) = match light.kind {
+        LIGHT_TRIANGLE | LIGHT_MIRRORED => (a + (e1 + e2) / 3.0, e1.dot(e1).max(e2.dot(e2))),
+        LIGHT_SPHERE => (a, b.x * b.x),
+        _ => (a, 0.0),
+    };
+    let to_light = middle - r.position;
+    let d2 = (to_light.dot(to_light) + extent2).max(1e-30);
     let w = to_light / d2.sqrt();
     let cosine = r.normal.dot(w);
-    let cosine = if r.lets_light_through { cosine.abs() } else { cosine };
-    let share = if light.kind == LIGHT_SPOT { spot_share(light, w) } else { 1.0 };
-    let brings = (share * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2).min(MAX_ODDS);
+    let rim = (extent2 / d2).sqrt();
+    let cosine = if r.lets_light_through { cosine.abs() } else { cosine } + rim;
+    let emits = match light.kind {
+        LIGHT_SPHERE => PI * extent2,
+        LIGHT_SPOT => spot_share(light, w),
+        _ if is_panel => {
+            let n = e1.cross(e2);
+            let two_sided = scene.materials[light.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
+            let towards = if two_sided { n.dot(w).abs() } else { -n.dot(w) };
+            if towards > 0.0 { 0.5 * (towards + rim * n.length()) } else { 0.0 }
+        }
+        _ => 1.0,
+    };
+    let brings = (emits * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2).min(MAX_ODDS);
     if cosine > 0.0 || r.lets_light_through { brings } else { 0.0 }
 }
 
 /// Chooses anew among the point and spot lights, which lie before those with a surface: by what each would bring if nothing were in
 /// its way.
 fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
-    let (mut chosen, mut sum, mut odds, mut group) = (scene.lights[0], 0.0, 0.0, 0.0);
+    let (mut chosen, mut sum, mut number, mut odds, mut group) = (scene.lights[0], 0.0, 0.0f32, 0.0, 0.0);
+    let even = u < EVEN_SHARE;
+    u = if even { u / EVEN_SHARE } else { (u - EVEN_SHARE) / (1.0 - EVEN_SHARE) }.min(BELOW_ONE);
     let before_surfaces = scene.lights.iter().take_while(|light| !light.has_surface());
     for light in before_surfaces.filter(|light| light.is_point_or_spot()) {
         group += light.probability;
-        let brings = unshadowed(light, r);
+        let brings = unshadowed(scene, light, r);
         sum += brings;
-        let share = if brings > 0.0 { brings / sum } else { 0.0 };
+        number += if brings > 0.0 { 1.0 } else { 0.0 };
+        let share = match brings > 0.0 {
+            true if even => 1.0 / number,
+            true => brings / sum,
+            false => 0.0,
+        };
         let takes = u < share;
         if takes {
             (chosen, odds) = (*light, brings);
@@ -269,10 +298,53 @@ fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
     }
     chosen.probability = group;
     match sum > 0.0 {
-        true => chosen.probability *= odds / sum,
+        true => chosen.probability *= mixed(odds / sum, number),
         false => chosen.value = [0.0; 3],
     }
     chosen
+}
+
+/// The share of the choices that a light has by what it brings, or alike with all of `number`.
+fn mixed(share: f32, number: f32) -> f32 {
+    share * (1.0 - EVEN_SHARE) + 1.0 / number * EVEN_SHARE
+}
+
+/// Whether one of several such is chosen.
+fn is_resampled(scene: &Scene, light: &Light) -> bool {
+    scene.resampled_lights && !light.is_far() && !(scene.weighed_lights && light.is_point_or_spot())
+}
+
+/// Chooses anew between a light that the table has chosen and others that it chooses likewise, and returns the factor of its radiance.
+fn resample(scene: &Scene, r: &Receiver, word: u32, light: &mut Light) -> f32 {
+    let spacing = u32::MAX / CANDIDATES + 1;
+    let own = word / spacing;
+    let (mut number, mut before, mut candidates) = (0.0, 0.0, Vec::new());
+    for i in 0..CANDIDATES {
+        let candidate = scene.lights[alias_choose(&scene.light_table, word % spacing + i * spacing).0 as usize];
+        let counts = is_resampled(scene, &candidate);
+        let weight = (unshadowed(scene, &candidate, r) / candidate.probability).min(MAX_ODDS);
+        candidates.push((candidate, if counts { weight } else { 0.0 }));
+        number += if counts { 1.0 } else { 0.0 };
+        before += if counts && i < own { 1.0 } else { 0.0 };
+    }
+    let sum: f32 = candidates.iter().map(|(_, weight)| weight).sum();
+    candidates.retain(|(_, weight)| *weight > 0.0);
+    let positive = candidates.len() as f32;
+    let mut u = ((before + unit_interval(pcg(word))) / number).min(BELOW_ONE);
+    let mut factor = 0.0;
+    for (candidate, weight) in candidates {
+        let share = mixed(weight / sum, positive);
+        if u >= 0.0 {
+            (*light, factor) = (candidate, 1.0 / (number * share));
+        }
+        u -= share;
+    }
+    factor
+}
+
+/// How many times as often as the table says MIS takes a light of this probability to be chosen.
+fn boost(scene: &Scene, probability: f32) -> f32 {
+    if scene.resampled_lights { BOOST.min(1.0 / probability) } else { 1.0 }
 }
 
 fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
@@ -289,26 +361,31 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
 
 /// One light for a receiver. Radiance is 0 when the light cannot reach the point.
 pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSample {
-    let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
-    let (mut light, p) = (&scene.lights[chosen as usize], r.position);
-    let weighed;
+    let (chosen, rest) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
+    let (mut light, p) = (scene.lights[chosen as usize], r.position);
     if scene.weighed_lights && light.is_point_or_spot() {
-        weighed = choose_by_share(scene, r, u.x);
-        light = &weighed;
+        light = choose_by_share(scene, r, u.x);
     }
-    match light.kind {
-        LIGHT_TRIANGLE | LIGHT_MIRRORED => sample_triangle_light(scene, light, p, u),
-        LIGHT_SPHERE => sample_sphere_light(light, p, u),
-        LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, p),
+    let resampled = is_resampled(scene, &light);
+    let factor = if resampled { resample(scene, r, word, &mut light) } else { 1.0 };
+    let mut sample = match light.kind {
+        LIGHT_TRIANGLE | LIGHT_MIRRORED => sample_triangle_light(scene, &light, p, u),
+        LIGHT_SPHERE => sample_sphere_light(&light, p, u),
+        LIGHT_POINT | LIGHT_SPOT => sample_point_light(&light, p),
         LIGHT_DIRECTIONAL => LightSample {
             direction: -Vec3::from(light.b),
             distance: INFINITE_DISTANCE,
             radiance: Vec3::from(light.value) / light.probability,
             pdf: 0.0,
-            sharp: is_sharp(light),
+            sharp: is_sharp(&light),
         },
-        _ => sample_environment(scene, light, word, u),
+        _ => sample_environment(scene, &light, rest, u),
+    };
+    if resampled {
+        sample.radiance *= factor;
+        sample.pdf *= boost(scene, light.probability);
     }
+    sample
 }
 
 /// Density per solid angle with which [`light_sample`] chooses, from `origin`, a point of an emissive triangle or
@@ -316,6 +393,8 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
 pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
     let [a, e1, e2] = s.triangle;
     let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
+    let area = if s.radius > 0.0 { 4.0 * PI * s.radius * s.radius } else { 0.5 * unit_vector(e1.cross(e2)).1 };
+    let density = density * boost(scene, density * area);
     if s.radius > 0.0 {
         let cap = sphere_cap(a - origin, s.radius);
         return if cap > 0.0 { density * 2.0 * s.radius * s.radius / cap } else { 0.0 };

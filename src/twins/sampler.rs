@@ -1,5 +1,5 @@
 //! Twin of `glsl/shared/sampler.glsl`: the words agree with `==`.
-use crate::math::hash::pcg;
+use crate::math::hash::{pcg, unit_interval};
 use glam::Vec2;
 
 /// State of one sample's random numbers: everything they depend on but the dimension.
@@ -54,7 +54,7 @@ pub fn sample_2d_bits(s: Sampler, pair: u32) -> [u32; 2] {
 
 /// Two numbers in [0, 1), from the upper 24 bits of each word.
 pub fn unit_floats(bits: [u32; 2]) -> Vec2 {
-    Vec2::new((bits[0] >> 8) as f32, (bits[1] >> 8) as f32) * 5.9604645e-8
+    Vec2::from_array(bits.map(unit_interval))
 }
 
 /// Two numbers in [0, 1).

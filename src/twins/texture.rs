@@ -4,7 +4,7 @@ use crate::layout::{
     TEXTURE_FLOAT, TEXTURE_MIRROR_U, TEXTURE_MIRROR_V, TEXTURE_NEAREST, TEXTURE_RGB9E5, TEXTURE_SHEARED, TEXTURE_SRGB,
     Texture,
 };
-use crate::math::hash::pcg;
+use crate::math::hash::{pcg, unit_interval};
 use crate::math::octahedral::octahedral_vector;
 use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb;
@@ -145,6 +145,6 @@ pub fn mask_leaves(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec
             - opacity * (1.0 - clear_wall_passes(scene, material, (triangle, instance), barycentric, direction));
     }
     let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
-    let blocks = opacity > (pcg(seed ^ surface) >> 8) as f32 * 5.9604645e-8;
+    let blocks = opacity > unit_interval(pcg(seed ^ surface));
     if blocks { Vec3::ZERO } else { Vec3::ONE }
 }

@@ -127,7 +127,40 @@ fn many_lights() -> Loaded {
     text += "[[light]]\ntype = 'point'\nposition = [0.0, 2.0, 0.0]\nintensity = 3.0\n\
              [[light]]\ntype = 'spot'\nposition = [0.0, 3.0, 0.0]\ndirection = [0.0, -1.0, 0.0]\nintensity = 9.0\n\
              [[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.2]\nirradiance = 0.5\n";
-    place.scene(&text)
+    let mut scene = place.scene(&text);
+    (scene.resampled_lights, scene.weighed_lights) = (false, false);
+    scene
+}
+
+#[test]
+fn lights_that_are_dark_count_for_nothing() {
+    let with = |lit: usize, dark: usize| {
+        let light =
+            |intensity| format!("[[light]]\ntype = 'point'\nposition = [0.0, 1.0, 0.0]\nintensity = {intensity}\n");
+        let scene = Workplace::new().scene(&(light(1).repeat(lit) + &light(0).repeat(dark)));
+        (scene.weighed_lights, scene.resampled_lights)
+    };
+    assert_eq!(
+        [with(1, 0), with(1, 1), with(32, 0), with(32, 5)],
+        [(false, false), (true, false), (true, false), (true, false)]
+    );
+    assert_eq!([with(33, 0), with(33, 5)], [(false, true); 2]);
+}
+
+#[test]
+fn lamps_that_shine_from_both_sides_have_twice_the_power() {
+    let place = Workplace::new().obj("one.obj", &[LAMP]).obj("two.obj", &[LAMP.map(|p| p + 3.0)]);
+    let lamp = |name: &str, more| {
+        format!(
+            "[[material]]\nname = '{name}'\nemission = 1.0\n{more}[[mesh]]\nfile = '{name}.obj'\nmaterial = '{name}'\n"
+        )
+    };
+    let scene = place.scene(&(lamp("one", "") + &lamp("two", "emission_two_sided = true\n")));
+    let probability = |behind| {
+        let flags = |l: &&Light| scene.materials[l.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
+        scene.lights.iter().find(|l| flags(l) == behind).unwrap().probability
+    };
+    assert!((probability(true) - 2.0 / 3.0).abs() < 1e-6 && (probability(false) - 1.0 / 3.0).abs() < 1e-6);
 }
 
 fn single_lights() -> [(&'static str, Loaded); 4] {

@@ -187,6 +187,43 @@ pub fn mean(scene: &Loaded, strategy: Strategy, samples: u32) -> Estimate {
     Estimate { mean: mean / n, error: variance.sqrt() / n }
 }
 
+/// A gallery of small lamps of all kinds, a few of which matter to each place, below a dim sky, and as many `points` of light.
+pub fn many_lamps(points: usize) -> Loaded {
+    let mut random = Random::new(11);
+    let mut place = Workplace::new();
+    let mut text = "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [-4.5, 0.8, 0.0]\ntarget = [-3.2, 0.0, 0.0]\nfov = 40.0\n\
+                    [render]\nmax_depth = 2\n[environment]\nradiance = 0.02\n[[material]]\nname = 'plastic'\ntype = 'coated'\n\
+                    alpha = 0.2\n[[mesh]]\nshape = 'rectangle'\ntransform = { rotate = [-90.0, 0.0, 0.0], scale = [6.0, 1.5, 1.0] }\n\
+                    [[mesh]]\nshape = 'cube'\nmaterial = 'plastic'\ntransform = { translate = [-3.0, 0.3, 0.2], scale = 0.3 }\n"
+        .to_owned();
+    for (name, emission) in [("a", "20.0"), ("b", "[90.0, 40.0, 20.0]\nemission_two_sided = true")] {
+        let triangles = [0; 12].map(|_| {
+            let middle = vec3(6.0, 0.4, 1.4) * random.point() + 1.4 * Vec3::Y;
+            [0; 3].map(|_| middle + 0.15 * random.point())
+        });
+        place = place.obj(&format!("{name}.obj"), &triangles);
+        text += &format!("[[material]]\nname = '{name}'\nemission = {emission}\n");
+        text += &format!("[[mesh]]\nfile = '{name}.obj'\nmaterial = '{name}'\n");
+    }
+    let mut at = |height: f32| (vec3(6.0, 0.3, 1.4) * random.point() + height * Vec3::Y).to_array();
+    for _ in 0..6 {
+        let place = at(1.2);
+        text += &format!(
+            "[[mesh]]\nshape = 'sphere'\nmaterial = 'a'\ntransform = {{ scale = 0.06, translate = {place:?} }}\n"
+        );
+    }
+    for i in 0..points {
+        let (place, axis) = (at(1.8), at(-1.0));
+        text += &match i % 2 {
+            0 => format!("[[light]]\ntype = 'point'\nposition = {place:?}\nintensity = 0.3\n"),
+            _ => format!(
+                "[[light]]\ntype = 'spot'\nposition = {place:?}\ndirection = {axis:?}\nintensity = 2.0\ncutoff = 30\n"
+            ),
+        };
+    }
+    place.scene(&text)
+}
+
 /// A square whose corners have colours and opacities of their own.
 const SQUARE: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
                       property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\nelement face 2\n\

@@ -3,7 +3,8 @@
 use crate::support::kernels::{accumulate as fold_kernel, traverse as traverse_kernel};
 use crate::support::{self, assert_silent, gpu};
 use crate::twin::{
-    Aim, BALL, MIRRORS, PATTERNS, Random, Workplace, aimed_at_seam, ball, instanced_ball, patterned_lamp, under_a_panel,
+    Aim, BALL, MIRRORS, PATTERNS, Random, Workplace, aimed_at_seam, ball, instanced_ball, many_lamps, patterned_lamp,
+    under_a_panel,
 };
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
@@ -241,6 +242,12 @@ fn renders_agree_with_their_twins() {
     check("wide sky", &run(&gpu, &sky, called_for(&sky, &sky.settings, outputs)));
     let mut panel = under_a_panel();
     small(&mut panel.settings);
+    for points in [3, 40] {
+        let mut lamps = many_lamps(points);
+        small(&mut lamps.settings);
+        assert!(lamps.resampled_lights && lamps.weighed_lights == (points < 33));
+        check("many lamps", &run(&gpu, &lamps, called_for(&lamps, &lamps.settings, outputs)));
+    }
     check("panel", &run(&gpu, &panel, called_for(&panel, &panel.settings, outputs)));
     let balls = spheres();
     check("spheres", &run(&gpu, &balls, called_for(&balls, &balls.settings, outputs)));

@@ -372,6 +372,33 @@ fn large_lamps_are_sampled_by_solid_angle() {
     assert!(!wrong.agrees(&near), "control: {wrong:?} {near:?}");
 }
 
+/// Whichever way lights are chosen, and whichever way their light is found, it is the same.
+#[test]
+fn many_lamps_are_chosen_by_what_they_bring() {
+    for points in [0, 3, 40] {
+        let scene = many_lamps(points);
+        assert!(scene.resampled_lights && scene.weighed_lights == (points == 3));
+        let mut by_power = scene.clone();
+        by_power.resampled_lights = false;
+        let strategies =
+            if points == 0 { &[Strategy::Both, Strategy::Light, Strategy::Bsdf][..] } else { &[Strategy::Both] };
+        let expected = mean(&by_power, Strategy::Both, 1024);
+        for strategy in strategies {
+            let found = mean(&scene, *strategy, 256);
+            assert!(found.agrees(&expected), "{points} {strategy:?}: {found:?}, by power {expected:?}");
+        }
+        let [chosen, by_power] = [&scene, &by_power].map(|scene| mean(scene, Strategy::Light, 256).error);
+        assert!(chosen < 0.75 * by_power, "{points}: {chosen} of {by_power}");
+        let mut wrong = scene;
+        wrong.lights.iter_mut().for_each(|light| light.probability *= 1.1);
+        let found = mean(&wrong, Strategy::Light, 256);
+        assert!(
+            !found.agrees(&expected),
+            "control, {points}: {found:?} by other probabilities than the table's, {expected:?}"
+        );
+    }
+}
+
 /// Share of samples of a lamp whose light is not what a ray in their direction meets.
 fn other_light(scene: &Loaded) -> f64 {
     let differs = |i: &usize| {

@@ -69,7 +69,7 @@ impl LightTable {
                 if !((0.0..=cutoff).contains(&cone) && cutoff > 0.0 && cutoff <= 180.0) {
                     return Err(format!("cone {cone} and cutoff {cutoff}: need 0 <= cone <= cutoff <= 180 degrees"));
                 }
-                let c = [cone.to_radians().cos(), cutoff.to_radians().cos(), 0.0];
+                let c = [cone.to_radians(), cutoff.to_radians(), 0.0];
                 let value = emitted(self.intensity, "intensity", MAX_INTENSITY)?;
                 Ok(Light { kind: LIGHT_SPOT, a, b: self.axis(a.into())?, c, value, ..light })
             }
@@ -130,7 +130,7 @@ mod tests {
                 ..Default::default()
             };
             let [full, dark, _] = table.build().unwrap().c;
-            assert_eq!([full, dark], expected.map(|degrees: f32| degrees.to_radians().cos()), "{given:?}");
+            assert_eq!([full, dark], expected.map(f32::to_radians), "{given:?}");
         }
     }
 }
