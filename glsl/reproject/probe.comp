@@ -18,22 +18,7 @@ layout(scalar, binding = 17) buffer Probes { Probe probes[]; };
 layout(scalar, binding = 18) writeonly buffer Changes { LightChange changes[]; };
 layout(scalar, push_constant) uniform Push { ProbePush push; };
 
-uint nodes_visited = 0u;
-
-#include "shared/sampler.glsl"
-#include "shared/warp.glsl"
-#include "shared/fresnel.glsl"
-#include "shared/microfacet.glsl"
-#include "shared/bsdf.glsl"
-#include "shared/texture.glsl"
 #include "shared/camera.glsl"
-#include "shared/traverse.glsl"
-#include "shared/trace.glsl"
-#include "shared/deal.glsl"
-#include "shared/surface.glsl"
-#include "shared/light.glsl"
-#include "shared/path_state.glsl"
-#include "shared/path_step.glsl"
 #include "shared/trace_path.glsl"
 #include "shared/history.glsl"
 #include "shared/probe_cell.glsl"

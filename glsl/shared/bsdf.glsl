@@ -1,8 +1,6 @@
 // Scattering at a surface point. Local frame: z = shading normal on the front side. `wo` points to the camera, `wi` to the
 // light; both leave the surface. Radiance is transported: refraction scales it by 1 / eta^2.
 // Needs effects.glsl and the binding `texels`, which holds the tables of rough coats and metallic microfacets.
-#ifndef BSDF_GLSL
-#define BSDF_GLSL
 #include "shared/warp.glsl"
 #include "shared/fresnel.glsl"
 #include "shared/microfacet.glsl"
@@ -282,5 +280,3 @@ vec3 bsdf_albedo(Bsdf b, float wo_z) {
     float f = fresnel_dielectric(abs(wo_z), glass ? relative_index(b, wo_z) : b.eta.x).x;
     return mix(glass ? b.transmission : b.albedo, b.specular, f);
 }
-
-#endif

@@ -1,4 +1,7 @@
-// Camera rays. Needs frame.glsl, sampler.glsl and warp.glsl before it.
+// Camera rays.
+#include "shared/frame.glsl"
+#include "shared/sampler.glsl"
+#include "shared/warp.glsl"
 
 struct Ray {
     vec3 origin;

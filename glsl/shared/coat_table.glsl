@@ -1,7 +1,5 @@
 // Tables of what rough interfaces reflect, by roughness and cosine: see COAT_ROWS. Twin: src/twins/coat.rs.
 // Needs the binding `texels`, which holds them.
-#ifndef COAT_TABLE_GLSL
-#define COAT_TABLE_GLSL
 #include "shared/texel_word.glsl"
 
 // The entries around a place in a table, in the order (row, column), (row, column + 1), (row + 1, column), (row + 1, column + 1),
@@ -25,5 +23,3 @@ TableCell table_cell(uint table, float row, float column) {
     uvec4 words = uvec4(texel_word(at), texel_word(at + 1u), texel_word(below), texel_word(below + 1u));
     return TableCell(words, vec2(column - float(j), row - float(i)));
 }
-
-#endif

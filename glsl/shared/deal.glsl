@@ -1,6 +1,7 @@
 // Traversal by whole subgroups. The rays of a subgroup differ in how many triangles they meet at a node, most in none, so that
 // lanes which test their own wait for each other. Here the triangles are dealt to all lanes, which test them for each other:
 // on lavapipe in a third of the turns. Every function must be called by all lanes, and returns the same bits as each ray alone.
+#include "shared/traverse.glsl"
 #ifdef RAY_QUERY
 const uint LANES = 0u;
 uint this_lane() { return 0u; } // neither is called

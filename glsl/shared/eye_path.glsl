@@ -1,4 +1,7 @@
-// A path as it leaves the camera. Needs which_path.glsl, camera.glsl and path_state.glsl before it.
+// A path as it leaves the camera.
+#include "shared/which_path.glsl"
+#include "shared/camera.glsl"
+#include "shared/path_state.glsl"
 
 PathState eye_path(uint pixel, uint index, Sampler random) {
     Ray eye = eye_ray(film_sample(pixel, random), random);

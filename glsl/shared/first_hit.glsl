@@ -1,4 +1,7 @@
-// What a camera ray meets and shows. Needs frame.glsl, bsdf.glsl, camera.glsl, traverse.glsl and surface.glsl before it.
+// What a camera ray meets and shows.
+#include "shared/camera.glsl"
+#include "shared/trace.glsl"
+#include "shared/surface.glsl"
 
 // A ray on its way through smooth surfaces.
 struct Sight {

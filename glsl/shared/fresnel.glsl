@@ -1,6 +1,4 @@
 // Exact unpolarised Fresnel reflectance.
-#ifndef FRESNEL_GLSL
-#define FRESNEL_GLSL
 
 // Returns x: the reflectance of a dielectric at cosine `c` >= 0, `eta` = index beyond / index on this side; y: the cosine of
 // the refracted ray, 0 under total reflection. With g = eta cos_t both amplitudes need one root. The lower limit of `c`
@@ -29,5 +27,3 @@ vec3 fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 rp = rs * (p - ac * s2) / (p + ac * s2);
     return 0.5 * (rs + rp);
 }
-
-#endif

@@ -1,5 +1,6 @@
 // For passes whose last workgroup goes on alone, with what all of them have left: a dispatch of its own would wait for the device to
-// run empty, and then for that one group. Needs block.glsl.
+// run empty, and then for that one group.
+#include "shared/block.glsl"
 layout(scalar, binding = 20) buffer Ended { uint ended[]; }; // workgroups that have got this far, 0 between dispatches
 
 shared bool is_last;

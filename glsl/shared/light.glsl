@@ -1,5 +1,6 @@
 // Choice of a light by an alias table in proportion to power, or of point and spot lights by what they bring, sampling of a point on
 // it, and the densities for MIS.
+#include "shared/surface.glsl"
 #include "shared/segment.glsl"
 #include "shared/luminance.glsl"
 

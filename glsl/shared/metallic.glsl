@@ -2,8 +2,6 @@
 // of a metal and of a dielectric above a base, which is diffuse or lets light through. Local frame and conventions: see bsdf.glsl.
 // Fresnel reflectances are Schlick's, F(c) = f0 + (f90 - f0) (1 - c)^5 at the cosine c; microfacets are GGX.
 // Needs the binding `texels`, which holds the table of what they reflect.
-#ifndef METALLIC_GLSL
-#define METALLIC_GLSL
 #include "shared/warp.glsl"
 #include "shared/microfacet.glsl"
 #include "shared/coat_table.glsl"
@@ -218,5 +216,3 @@ float metallic_specular(Metallic b) {
 bool metallic_is_delta(Metallic b) {
     return smooth_alpha(b.alpha) && b.diffuse == vec3(0.0) && (!has_coat(b) || smooth_alpha(b.coat_alpha));
 }
-
-#endif

@@ -1,7 +1,5 @@
 // Isotropic microfacet distributions over normals m with m.z > 0, roughness `alpha` in [0.01, 1]; `w.z` > 0.
 // Needs effects.glsl.
-#ifndef MICROFACET_GLSL
-#define MICROFACET_GLSL
 #include "shared/warp.glsl"
 
 const float INV_SQRT_PI = 0.564189583547756;
@@ -93,5 +91,3 @@ vec3 microfacet_sample(bool ggx, vec3 w, float alpha, vec2 u) {
     vec3 m = is_ggx(ggx) ? ggx_visible_normal(stretched, u) : beckmann_visible_normal(stretched, u);
     return normalize(vec3(alpha * m.xy, m.z));
 }
-
-#endif

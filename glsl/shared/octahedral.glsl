@@ -1,6 +1,4 @@
 // Unit vectors as points of the square [-1, 1]^2, an unfolded octahedron (Meyer et al. 2010); encoded as two 16-bit snorms.
-#ifndef OCTAHEDRAL_GLSL
-#define OCTAHEDRAL_GLSL
 
 // The unit vector of a point of the square [-h, h]^2. Not by normalize(), for which some drivers divide three times more, in case
 // that squares of components overflow.
@@ -25,5 +23,3 @@ vec3 octahedral_decode(uint bits) {
 }
 
 uint octahedral_encode(vec3 n) { return packSnorm2x16(octahedral_point(n)); }
-
-#endif

@@ -1,5 +1,7 @@
 // Paths that wait between the kernels of a wavefront: words of one kind of all paths lie together, so that neighbouring threads read
-// neighbouring words. Needs path_state.glsl and which_path.glsl before it.
+// neighbouring words.
+#include "shared/path_state.glsl"
+#include "shared/which_path.glsl"
 layout(scalar, binding = 16) buffer Memory { uvec4 memory[]; };
 
 // What is kept of a path: a vector, and with it a word.

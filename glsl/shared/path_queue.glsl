@@ -1,5 +1,6 @@
 // Paths that wait for their rays: two counts, then for either stage of two their numbers. Before their first rays all paths of a batch
-// wait, in order. Needs which_path.glsl before it.
+// wait, in order.
+#include "shared/which_path.glsl"
 layout(scalar, binding = 17) buffer Queue { uint queue[]; };
 
 uint waiting() { return push.stage == 0u ? path_count() : queue[push.stage & 1u]; }

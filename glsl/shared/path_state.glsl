@@ -1,4 +1,5 @@
-// What a path takes from one surface to the next, and what light it has found. Needs `push` (PathPush), and sampler.glsl before it.
+// What a path takes from one surface to the next, and what light it has found. Needs `push` (PathPush).
+#include "shared/pcg.glsl"
 #include "shared/segment.glsl"
 
 struct Path {

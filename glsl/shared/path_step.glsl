@@ -1,5 +1,9 @@
 // A path's way from one surface to the next: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
-// Needs `push` (PathPush), and sampler.glsl, surface.glsl, light.glsl and path_state.glsl before it.
+// Needs `push` (PathPush).
+#include "shared/sampler.glsl"
+#include "shared/surface.glsl"
+#include "shared/light.glsl"
+#include "shared/path_state.glsl"
 
 // Dimension pairs of the sampler: the camera uses the first two, every scattering event these.
 const uint PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;

@@ -1,6 +1,8 @@
 // What a path leaves behind: one vec4 (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). With
 // FX_SOFT what lamps and sky bring to the first hit goes with indirect light, since it is as noisy. w of the first is the number of
-// rays, negated where the light was not finite: such a sample is black. Needs finite.glsl and path_state.glsl before it.
+// rays, negated where the light was not finite: such a sample is black.
+#include "shared/finite.glsl"
+#include "shared/path_state.glsl"
 #include "shared/counters.glsl"
 #include "shared/store64.glsl"
 layout(scalar, binding = 11) writeonly buffer Samples { u64vec2 samples[]; }; // of vec4

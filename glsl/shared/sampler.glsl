@@ -1,6 +1,4 @@
 // Random numbers that depend on (pixel, sample index, dimension pair, seed) only. Needs effects.glsl.
-#ifndef SAMPLER_GLSL
-#define SAMPLER_GLSL
 
 // `index` is bit-reversed for Sobol points: every step but the outputs works on reversed words.
 struct Sampler {
@@ -61,5 +59,3 @@ vec2 unit_floats(uvec2 bits) {
 vec2 sample_2d(Sampler s, uint pair) {
     return unit_floats(sample_2d_bits(s, pair));
 }
-
-#endif

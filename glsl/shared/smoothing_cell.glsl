@@ -1,5 +1,7 @@
 // Estimates are smoothed over square cells: they vary slowly, and a quarter of the sums suffices. A cell stands for the surface of its
-// first known pixel, or of its first pixel if none is. Needs edge.glsl.
+// first known pixel, or of its first pixel if none is.
+#include "shared/edge.glsl"
+
 const int SMOOTHING_CELL = 2; // pixels along an edge
 
 // Cells across and down an image; those at the right and the lower border may lack pixels.

@@ -1,4 +1,6 @@
 // Computes what shading needs of a hit: position, normals, the resolved BSDF, emission.
+#include "shared/bsdf.glsl"
+#include "shared/texture.glsl"
 #include "shared/octahedral.glsl"
 #include "shared/segment.glsl"
 

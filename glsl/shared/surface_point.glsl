@@ -1,13 +1,4 @@
-// Points of surfaces as they are kept from frame to frame. Includes what surface_at and surface_bsdf need.
-uint nodes_visited = 0u; // traverse.glsl counts
-
-#include "shared/pcg.glsl"
-#include "shared/warp.glsl"
-#include "shared/fresnel.glsl"
-#include "shared/microfacet.glsl"
-#include "shared/bsdf.glsl"
-#include "shared/texture.glsl"
-#include "shared/traverse.glsl"
+// Points of surfaces as they are kept from frame to frame.
 #include "shared/surface.glsl"
 
 Surface surface_of(uint triangle, uint instance, vec2 weights) {

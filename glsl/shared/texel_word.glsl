@@ -1,7 +1,5 @@
 // A word of the array behind `texels`, which holds textures, attributes of vertices and tables. Where the scene has more words than a
 // view may have texels, the view shows them by four.
-#ifndef TEXEL_WORD_GLSL
-#define TEXEL_WORD_GLSL
 
 uint texel_word(uint at) {
     if (!FX_MANY_TEXELS) return texelFetch(texels, int(at)).x;
@@ -9,5 +7,3 @@ uint texel_word(uint at) {
     uvec2 two = (at & 2u) != 0u ? four.zw : four.xy;
     return (at & 1u) != 0u ? two.y : two.x;
 }
-
-#endif

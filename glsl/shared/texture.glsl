@@ -1,7 +1,8 @@
 // Bilinear lookups of textures, which share one texel buffer since lavapipe has no descriptor indexing; a GPU's texture units go
 // unused. There are no mip levels: a pixel's samples average a texture without the bias of a blur, and levels would cost a third
 // more memory.
-
+#include "shared/pcg.glsl"
+#include "shared/scene.glsl"
 #include "shared/segment.glsl"
 #include "shared/texel_word.glsl"
 

@@ -1,4 +1,5 @@
 // What rays meet: found by the traversal of traverse.glsl, or in the form of a kernel with RAY_QUERY by the device itself.
+#include "shared/traverse.glsl"
 #ifdef RAY_QUERY
 #include "shared/ray_query.glsl"
 #else

@@ -1,4 +1,7 @@
-// A path traced as a whole, by the thread that begins it. Needs path_step.glsl, trace.glsl and deal.glsl before it.
+// A path traced as a whole, by the thread that begins it.
+#include "shared/path_step.glsl"
+#include "shared/trace.glsl"
+#include "shared/deal.glsl"
 
 // Follows a path that has come to its first hit to its end. One that is not `on` keeps others company where triangles are dealt.
 void trace_path(inout PathState p, bool on, Sampler random) {

@@ -1,12 +1,14 @@
 // Closest hit and any hit of a ray through eight-way compressed nodes (Ylitie, Karras, Laine, HPG 2017), as obvhs builds them,
-// with a watertight triangle test. The including kernel binds `nodes`, `triangles`, `instances`, and for masks `shading`,
-// `materials`, `textures`, `texels`. Kernels that trace include trace.glsl behind it.
+// with a watertight triangle test. Kernels call what trace.glsl makes of it.
 //
 // The code is shaped for lavapipe, which executes all of it under masks for every node: few instructions and few variables that
 // live from step to step count for more than early exits. A loop that tests at its head would run its body once more with no
 // lane active, so loops test at their end. A GPU would gain from early exits, and loses a little by both.
 
-#include "shared/segment.glsl"
+#include "shared/scene.glsl"
+#include "shared/texture.glsl"
+
+uint nodes_visited = 0u; // by this thread
 
 // Number of groups that a ray of this scene can leave on its stack (scene/build/bvh.rs). Two stay in registers. lavapipe writes
 // to an array lane by lane, with a branch each, so that an unconditional write, useless where no group is left, costs less.

@@ -1,6 +1,4 @@
 // Maps from the unit square to directions, triangles, lenses and pixel filters. Inputs in [0, 1).
-#ifndef WARP_GLSL
-#define WARP_GLSL
 
 const float PI = 3.14159265358979;
 const float INV_PI = 0.318309886183791;
@@ -88,5 +86,3 @@ mat3 basis_from_normal(vec3 n) {
     float b = n.x * n.y * a;
     return mat3(1.0 + s * n.x * n.x * a, s * b, -s * n.x, b, s + n.y * n.y * a, -n.y, n);
 }
-
-#endif

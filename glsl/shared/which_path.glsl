@@ -1,5 +1,7 @@
 // Which path a thread traces. Path i of a batch is sample first_sample + i / pixels of pixel first_pixel + i % pixels, or that of a
-// list. Needs `push` (PathPush), and thread.glsl and sampler.glsl before it.
+// list. Needs `push` (PathPush).
+#include "shared/thread.glsl"
+#include "shared/sampler.glsl"
 layout(binding = 13) uniform usamplerBuffer paths; // of uvec2
 
 bool is_listed() { return FX_ADAPTIVE && push.samples == 0u; }

@@ -10,11 +10,6 @@ layout(scalar, binding = 12) writeonly buffer Hits { RayHit hits[]; };
 layout(constant_id = 110) const bool BEHIND = false; // finds what a ray meets that leaves its first hit
 layout(scalar, push_constant) uniform Push { TraversePush push; };
 
-uint nodes_visited = 0u;
-
-#include "shared/sampler.glsl"
-#include "shared/texture.glsl"
-#include "shared/traverse.glsl"
 #include "shared/trace.glsl"
 #include "shared/deal.glsl"
 

@@ -13,18 +13,6 @@ layout(binding = 12) uniform samplerBuffer filtered; // of vec4
 layout(scalar, binding = 13) buffer Indirect { vec3 indirect[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
-uint nodes_visited = 0u;
-
-#include "shared/sampler.glsl"
-#include "shared/warp.glsl"
-#include "shared/fresnel.glsl"
-#include "shared/microfacet.glsl"
-#include "shared/bsdf.glsl"
-#include "shared/texture.glsl"
-#include "shared/camera.glsl"
-#include "shared/traverse.glsl"
-#include "shared/trace.glsl"
-#include "shared/surface.glsl"
 #include "shared/first_hit.glsl"
 
 // Departure from the paper, whose quotients are 0 / 0 on one plane: the largest difference counts as at least this, so that

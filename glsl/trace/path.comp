@@ -8,24 +8,7 @@
 layout(local_size_x_id = 100) in;
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
-uint nodes_visited = 0u;
-
-#include "shared/sampler.glsl"
-#include "shared/warp.glsl"
-#include "shared/fresnel.glsl"
-#include "shared/microfacet.glsl"
-#include "shared/bsdf.glsl"
-#include "shared/texture.glsl"
-#include "shared/camera.glsl"
-#include "shared/traverse.glsl"
-#include "shared/trace.glsl"
-#include "shared/deal.glsl"
-#include "shared/surface.glsl"
-#include "shared/light.glsl"
-#include "shared/path_state.glsl"
-#include "shared/path_step.glsl"
 #include "shared/trace_path.glsl"
-#include "shared/which_path.glsl"
 #include "shared/eye_path.glsl"
 #include "shared/sample.glsl"
 

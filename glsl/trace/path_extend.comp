@@ -11,14 +11,7 @@ layout(scalar, push_constant) uniform Push { PathPush push; };
 
 const uint PATHS_A_THREAD = 8u; // from the first surface on, where all paths of a batch wait
 
-uint nodes_visited = 0u;
-
-#include "shared/sampler.glsl"
-#include "shared/texture.glsl"
-#include "shared/traverse.glsl"
 #include "shared/trace.glsl"
-#include "shared/path_state.glsl"
-#include "shared/which_path.glsl"
 #include "shared/path_memory.glsl"
 #include "shared/path_queue.glsl"
 #include "shared/counters.glsl"

@@ -7,11 +7,6 @@
 layout(local_size_x_id = 100) in;
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
-#include "shared/sampler.glsl"
-#include "shared/warp.glsl"
-#include "shared/camera.glsl"
-#include "shared/path_state.glsl"
-#include "shared/which_path.glsl"
 #include "shared/eye_path.glsl"
 #include "shared/path_memory.glsl"
 

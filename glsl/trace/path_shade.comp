@@ -7,17 +7,7 @@
 layout(local_size_x_id = 100) in;
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
-#include "shared/sampler.glsl"
-#include "shared/warp.glsl"
-#include "shared/fresnel.glsl"
-#include "shared/microfacet.glsl"
-#include "shared/bsdf.glsl"
-#include "shared/texture.glsl"
-#include "shared/surface.glsl"
-#include "shared/light.glsl"
-#include "shared/path_state.glsl"
 #include "shared/path_step.glsl"
-#include "shared/which_path.glsl"
 #include "shared/path_memory.glsl"
 #include "shared/path_queue.glsl"
 #include "shared/sample.glsl"

@@ -12,18 +12,6 @@ layout(scalar, binding = 12) writeonly buffer Points { SurfacePoint points[]; };
 layout(scalar, binding = 13) writeonly buffer Seen { Guide seen[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
-uint nodes_visited = 0u;
-
-#include "shared/sampler.glsl"
-#include "shared/warp.glsl"
-#include "shared/fresnel.glsl"
-#include "shared/microfacet.glsl"
-#include "shared/bsdf.glsl"
-#include "shared/texture.glsl"
-#include "shared/camera.glsl"
-#include "shared/traverse.glsl"
-#include "shared/trace.glsl"
-#include "shared/surface.glsl"
 #include "shared/first_hit.glsl"
 
 void main() {

@@ -144,10 +144,10 @@ impl History {
         entry::check(&settings.entries())?;
         let pixels = size[0] * size[1];
         Self::check_room(gpu, pixels)?;
-        let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
+        let thread = gpu.tuning().thread();
         let room = |on: bool| if on { pixels as usize } else { 1 };
-        let remember = || Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse });
-        let way = || Way::new(gpu, effects, traverse, settings.reproject);
+        let remember = || Kernel::new(gpu, &shaders::remember::Constants { effects, thread });
+        let way = || Way::new(gpu, effects, settings.reproject);
         let probes = || (moves == Moves::Scene).then(|| Probes::new(gpu, effects, stack, size)).transpose();
         let (probes, (remember, way)) = both(probes, || both(remember, way))?;
         Ok(Self {

@@ -4,7 +4,6 @@ use crate::error::Result;
 use crate::gpu::{Gpu, Kernel};
 use crate::layout::Effects;
 use crate::shaders;
-use crate::shaders::shared::traverse;
 
 /// Of either direction.
 pub enum Way {
@@ -26,15 +25,15 @@ pub struct Forward {
 impl Way {
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn new(gpu: &Gpu, effects: Effects, traverse: traverse::Constants, way: Reprojection) -> Result<Self> {
+    pub fn new(gpu: &Gpu, effects: Effects, way: Reprojection) -> Result<Self> {
         let thread = gpu.tuning().thread();
         Ok(match way {
             Reprojection::Backward => {
-                Self::Backward(Kernel::new(gpu, &shaders::gather::Constants { effects, thread, traverse })?)
+                Self::Backward(Kernel::new(gpu, &shaders::gather::Constants { effects, thread })?)
             }
             Reprojection::Off | Reprojection::Forward => Self::Forward(Forward {
-                edges: Kernel::new(gpu, &shaders::edges::Constants { effects, thread, traverse })?,
-                project: Kernel::new(gpu, &shaders::project::Constants { effects, thread, traverse })?,
+                edges: Kernel::new(gpu, &shaders::edges::Constants { effects, thread })?,
+                project: Kernel::new(gpu, &shaders::project::Constants { effects, thread })?,
                 carry: Kernel::new(gpu, &shaders::carry::Constants { effects, thread })?,
             }),
         })
