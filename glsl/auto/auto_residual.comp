@@ -2,11 +2,11 @@
 #include "shared/atrous_taps.glsl"
 #include "shared/luminance.glsl"
 #include "shared/candidates.glsl"
-#include "shared/filter_thread.glsl"
 
 // Gives back what the blend has lost: where its mean difference from the noisy pixels around is more than their noise explains, the
 // rest of the difference is added (twicing: Tukey 1977; soft threshold: Donoho 1995). Windows of like pixels, of 7x7, 3x3 and one
 // pixel, follow each other. A blend that fits the pixels stays as it is. A thread takes ROWS pixels of a column.
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(binding = 2) uniform samplerBuffer estimate; // of vec4

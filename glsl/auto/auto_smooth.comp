@@ -1,11 +1,11 @@
 #include "shared/edge.glsl"
 #include "shared/atrous_taps.glsl"
 #include "shared/smoothing_cell.glsl"
-#include "shared/filter_thread.glsl"
 
 // One level of A-Trous smoothing of one plane of estimates or three, which are right on average only. Cells of like surfaces
 // count by their edge weights, others at least by `push.least`; cells without a known pixel have no estimate. The first level
 // makes cells of pixels. A thread smooths ROWS cells of a column.
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(binding = 2) uniform usamplerBuffer cells; // of uvec4, of auto_cells.comp

@@ -1,10 +1,10 @@
 #include "shared/edge.glsl"
 #include "shared/atrous_taps.glsl"
-#include "shared/filter_thread.glsl"
 
 // Filters radiance by one level of the edge-avoiding A-Trous wavelet transform (Dammertz et al. 2010, section 2.2): 5x5 taps
 // that are push.spacing pixels apart, each weighted by how alike the two pixels are and by its number of samples. A thread
 // filters ROWS pixels of a column.
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };

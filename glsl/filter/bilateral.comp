@@ -1,8 +1,8 @@
 #include "shared/edge.glsl"
-#include "shared/filter_thread.glsl"
 
 // Filters radiance by the bilateral filter (Tomasi and Manduchi 1998), evaluated over the whole window; it is a joint one
 // where normals or positions have weights. A thread filters ROWS pixels of a column, which share nearly all their taps.
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };

@@ -1,12 +1,12 @@
 #include "shared/sanitise.glsl"
 #include "shared/luminance.glsl"
 #include "shared/dominated.glsl"
-#include "shared/filter_thread.glsl"
 
 // Cuts outliers, one pixel per thread: those of more than push.factor times the luminance of the second brightest of the 24 pixels
 // around them (a highlight does not stand alone) whose light one sample has brought, as their variance tells. The more samples,
 // the brighter one must be to do so, and in the limit nothing is cut. Where fewer than two pixels around are known, or most are
 // dark, nothing tells what is usual.
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
 layout(scalar, binding = 1) buffer Variance { vec3 variance[]; };
 layout(scalar, binding = 2) writeonly buffer Output { vec4 cut[]; };

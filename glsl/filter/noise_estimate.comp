@@ -1,11 +1,11 @@
 #include "shared/edge.glsl"
 #include "shared/atrous_taps.glsl"
 #include "shared/luminance.glsl"
-#include "shared/filter_thread.glsl"
 
 // Writes the radiance of pixels with the variance of their luminance, or -1 where a pixel is unknown. Few samples tell little of
 // their own variance: below ENOUGH samples it is the variance over like pixels of a 7x7 window (Schied et al. 2017, section 4.2). For
 // CAUTIOUS readers, below MANY samples, what those pixels' samples tell counts too. A thread takes ROWS pixels of a column.
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(binding = 2) uniform samplerBuffer variance; // of vec3

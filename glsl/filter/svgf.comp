@@ -1,12 +1,12 @@
 #include "shared/edge.glsl"
 #include "shared/atrous_taps.glsl"
 #include "shared/luminance.glsl"
-#include "shared/filter_thread.glsl"
 
 // Filters by one level of A-Trous wavelets whose luminance weight is relative to the pixel's standard deviation (Schied et al.
 // 2017, section 4.4). It filters the variance (w) too; the last level writes the number of samples in its place. A thread filters
 // ROWS pixels of a column. With TWO it filters a second image of the same surfaces beside the first: what both share of the weights
 // is most of the work.
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer estimate; // of vec4
 layout(binding = 1) uniform samplerBuffer second; // of vec4
 layout(binding = 2) uniform usamplerBuffer place; // of uvec4

@@ -1,10 +1,10 @@
 #include "shared/edge.glsl"
-#include "shared/filter_thread.glsl"
 
 // Computes one lifting step of a decimated wavelet transform whose details are dropped, forward or inverse, for one pixel per
 // thread. Odd pixels of a lattice are predicted from their even neighbours; even ones are updated by half the mean of the
 // prediction errors. It is CDF(2,2) along rows and columns, or red-black (Uytterhoeven and Bultheel 1998) on the quincunx;
 // with edge weights these are Fattal's (2009). Sums are of differences from the pixel, so that a constant image stays exact.
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };

@@ -138,12 +138,12 @@ impl Tuning {
 
     /// Constants of kernels that number their threads with `glsl/shared/thread.glsl`.
     pub fn thread(&self) -> shared::thread::Constants {
-        shared::thread::Constants { workgroup: self.workgroup, stripes: self.stripes }
+        shared::thread::Constants { workgroup: self.workgroup }
     }
 
-    /// Constants of filters that number their threads with `glsl/shared/filter_thread.glsl`.
-    pub fn filter_thread(&self) -> shared::filter_thread::Constants {
-        shared::filter_thread::Constants { workgroup: self.filter_workgroup }
+    /// Constants of kernels whose threads start paths.
+    pub fn eye_path(&self) -> shared::eye_path::Constants {
+        shared::eye_path::Constants { stripes: self.stripes }
     }
 
     /// Constants of kernels that trace rays; `stack` is the depth that the scene's traversal needs. It is rounded up, so that most scenes

@@ -447,7 +447,7 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
 /// Kernels whose numbers would make them overrun what they have, or the device.
 #[test]
 fn kernels_of_impossible_numbers_are_refused() {
-    let choose = |workgroup| Choose::new(&GPU, &shared::thread::Constants { workgroup, stripes: 1 }.into()).map(drop);
+    let choose = |workgroup| Choose::new(&GPU, &shared::thread::Constants { workgroup }.into()).map(drop);
     assert!([0, 1 << 30, u32::MAX].iter().all(|&workgroup| choose(workgroup).is_err()));
     assert!([0, 1025, u32::MAX].iter().all(|&items| Batches::new(&GPU, items).is_err()));
     assert!(choose(64).is_ok() && Batches::new(&GPU, 64).is_ok(), "control");

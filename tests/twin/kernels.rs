@@ -416,7 +416,7 @@ impl Traversal {
     fn with(gpu: &Gpu, scene: &Loaded, effects: Effects, behind: bool) -> Self {
         let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
         let traverse = gpu.tuning().traverse(scene.stack);
-        let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
+        let thread = shared::thread::Constants { workgroup: 32 };
         let constants = traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu), behind };
         let kernel = Kernel::new(gpu, &constants).unwrap();
         let root = frame_constants(scene, &scene.settings).unwrap().path.root;

@@ -77,8 +77,8 @@ impl AtrousSettings {
 impl Atrous {
     fn new(gpu: &Gpu, edge: &EdgeSettings, own: &AtrousSettings, levels: u32, size: [u32; 2]) -> Result<Self> {
         let kernel = |level: u32| {
-            let (edge, filter_thread) = (own.rates(edge, level).constants(), gpu.tuning().filter_thread());
-            Kernel::new(gpu, &Constants { edge, filter_thread, conserve: own.conserve_energy })
+            let (edge, local_size_x) = (own.rates(edge, level).constants(), gpu.tuning().filter_workgroup);
+            Kernel::new(gpu, &Constants { edge, local_size_x, conserve: own.conserve_energy })
         };
         let pack = Pack::new(gpu, size)?;
         Ok(Self {

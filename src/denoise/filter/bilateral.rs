@@ -40,8 +40,8 @@ impl Bilateral {
         let (pack, rate_space) = (Pack::new(gpu, size)?, rate_space(radius));
         let radius = radius.min(size[0].max(size[1]) - 1);
         let banded = bands(radius).0 > 1;
-        let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
-        let kernel = Kernel::new(gpu, &Constants { edge, filter_thread, bands: banded })?;
+        let (edge, local_size_x) = (rates.constants(), gpu.tuning().filter_workgroup);
+        let kernel = Kernel::new(gpu, &Constants { edge, local_size_x, bands: banded })?;
         let sums = Buffer::new(gpu, "sums", if banded { pack.colour.len() } else { 1 }, Location::Device)?;
         Ok(Self { pack, kernel, sums, radius, rate_space, rates })
     }

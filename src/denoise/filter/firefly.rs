@@ -89,9 +89,9 @@ impl Cut {
         if factor.is_nan() || factor < 1.0 {
             return Err(Error::Usage(format!("the firefly factor is {factor}: choose a number of at least 1")));
         }
-        let (measured, filter_thread) = (planes.variance.is_some(), gpu.tuning().filter_thread());
+        let (measured, local_size_x) = (planes.variance.is_some(), gpu.tuning().filter_workgroup);
         Ok(Self {
-            kernel: Kernel::new(gpu, &Constants { filter_thread, measured })?,
+            kernel: Kernel::new(gpu, &Constants { local_size_x, measured })?,
             whole,
             nothing: Buffer::new(gpu, "no variance", 1, Location::Device)?,
             factor,

@@ -32,8 +32,8 @@ impl Estimate {
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, edge: &EdgeSettings, cautious: bool, [width, height]: [u32; 2]) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
-        let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
-        let kernel = |measured| Kernel::new(gpu, &Constants { edge, filter_thread, measured, cautious });
+        let (edge, local_size_x) = (rates.constants(), gpu.tuning().filter_workgroup);
+        let kernel = |measured| Kernel::new(gpu, &Constants { edge, local_size_x, measured, cautious });
         Ok(Self {
             kernels: each([false, true], kernel)?,
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,

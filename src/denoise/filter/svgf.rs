@@ -77,8 +77,8 @@ impl Levels {
         two: bool,
     ) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
-        let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
-        let kernel = |last| Kernel::new(gpu, &Constants { edge, filter_thread, last, two });
+        let (edge, local_size_x) = (rates.constants(), gpu.tuning().filter_workgroup);
+        let kernel = |last| Kernel::new(gpu, &Constants { edge, local_size_x, last, two });
         let pixels = width as usize * height as usize;
         let scratch = |pixels| Buffer::new(gpu, "svgf", pixels, Location::Device);
         Ok(Self {

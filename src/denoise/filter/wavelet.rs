@@ -90,8 +90,8 @@ struct Wavelet {
 
 impl Wavelet {
     fn new(gpu: &Gpu, rates: Rates, steps: Vec<Lifting>, size: [u32; 2]) -> Result<Self> {
-        let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
-        let kernel = |inverse| Kernel::new(gpu, &Constants { edge, filter_thread, inverse });
+        let (edge, local_size_x) = (rates.constants(), gpu.tuning().filter_workgroup);
+        let kernel = |inverse| Kernel::new(gpu, &Constants { edge, local_size_x, inverse });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "wavelet", pack.colour.len(), Location::Device)?;
         let light = AsLight::new(gpu)?;

@@ -26,8 +26,9 @@ impl Paths {
         if gpu.tuning().has_wavefront(stack, max_depth) {
             return Ok(Self::Wavefront(Box::new(Wavefront::new(gpu, effects, stack, paths)?)));
         }
-        let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
-        Ok(Self::Whole(Kernel::new(gpu, &path::Constants { effects, thread, traverse, deal: gpu.deal() })?))
+        let tuning = gpu.tuning();
+        let (thread, eye_path, traverse) = (tuning.thread(), tuning.eye_path(), tuning.traverse(stack));
+        Ok(Self::Whole(Kernel::new(gpu, &path::Constants { effects, thread, eye_path, traverse, deal: gpu.deal() })?))
     }
 
     /// Time that the pipelines took to create.

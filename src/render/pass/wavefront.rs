@@ -33,8 +33,9 @@ impl Wavefront {
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses a kernel, or the paths do not fit.
     pub fn new(gpu: &Gpu, effects: Effects, stack: u32, paths: u32) -> Result<Self> {
-        let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
-        let generate = || Kernel::new(gpu, &path_generate::Constants { effects, thread });
+        let tuning = gpu.tuning();
+        let (thread, eye_path, traverse) = (tuning.thread(), tuning.eye_path(), tuning.traverse(stack));
+        let generate = || Kernel::new(gpu, &path_generate::Constants { effects, thread, eye_path });
         let extend = || Kernel::new(gpu, &path_extend::Constants { effects, thread, traverse });
         let shade = || Kernel::new(gpu, &path_shade::Constants { effects, thread });
         let (shade, (extend, generate)) = both(shade, || both(extend, generate))?;

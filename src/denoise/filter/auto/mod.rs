@@ -126,7 +126,7 @@ impl Auto {
         let [wide, middle, narrow, of_svgf] = candidates(settings);
         let windows_pack = Packed::new(gpu, settings.guided.channels, settings.edge.extent, size)?;
         let surfaces = Rates::of_surfaces(&settings.edge).constants();
-        let filter_thread = gpu.tuning().filter_thread();
+        let local_size_x = gpu.tuning().filter_workgroup;
         let windows =
             |(s, leverages): (&FilterSettings, _)| Windows::new(gpu, s.footprint.radius, s.guided.eps, leverages, size);
         let windows = || each([(&wide, false), (&middle, false), (&narrow, true)], windows);
@@ -135,7 +135,7 @@ impl Auto {
         let estimate = |(edge, cautious)| Estimate::new(gpu, edge, cautious, size);
         let estimates = || each([(&settings.edge, true), (&of_svgf.edge, false)], estimate);
         let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
-        let residual = || Kernel::new(gpu, &auto_residual::Constants { edge: surfaces, filter_thread });
+        let residual = || Kernel::new(gpu, &auto_residual::Constants { edge: surfaces, local_size_x });
         let ((windows, smoothing), ((svgf, [estimate, svgf_estimate]), (blend, residual))) = both(
             || both(windows, smoothing),
             || both(|| both(levels, estimates), || both(|| each([false, true], blend), residual)),

@@ -38,8 +38,8 @@ struct Kernels {
 
 impl Kernels {
     fn new(gpu: &Gpu, surfaces: &Rates, three: bool) -> Result<Self> {
-        let (edge, filter_thread) = (surfaces.constants(), gpu.tuning().filter_thread());
-        let smooth = |of_pixels| Kernel::new(gpu, &auto_smooth::Constants { edge, filter_thread, three, of_pixels });
+        let (edge, local_size_x) = (surfaces.constants(), gpu.tuning().filter_workgroup);
+        let smooth = |of_pixels| Kernel::new(gpu, &auto_smooth::Constants { edge, local_size_x, three, of_pixels });
         Ok(Self {
             smooth: each([true, false], smooth)?,
             spread: Kernel::new(gpu, &auto_spread::Constants { edge, three })?,
