@@ -25,10 +25,9 @@ layout(binding = 11) uniform samplerBuffer surroundings; // of vec4, of auto_lev
 layout(binding = 12) uniform samplerBuffer leverages; // of vec4, the same, not smoothed
 layout(scalar, binding = 13) writeonly buffer Blend { vec4 blend[]; };
 layout(scalar, binding = 14) writeonly buffer Expected { vec3 expected[]; };
-layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 layout(scalar, push_constant) uniform Push { AutoBlendPush push; };
 
-#include "shared/variance_at.glsl"
+#include "shared/own_variance.glsl"
 
 const uint ROUNDS = 4u;       // of exchanges between all pairs
 const float RIDGE = 0.01;     // share added to every squared error: candidates that hardly differ get like weights
@@ -43,14 +42,6 @@ const float OF_ONE_SAMPLE = 3.0;
 // From this number of samples on: of fewer, one often brings most.
 const float ENOUGH_TO_TELL_ONE = 8.0;
 const float MAX_ERROR = 1e24; // is above every error
-
-// What the pixel's samples say of the variance of their mean.
-float own_variance(uint i, float count) {
-    vec3 v = MEASURED ? variance_at(int(i)) : vec3(-1.0);
-    bool measured = count >= 2.0 && finite(v) && all(greaterThanEqual(v, vec3(0.0)));
-    float deviation = min(luminance(sqrt(v)), STRONGEST); // as in noise_estimate.comp
-    return measured ? deviation * deviation : UNMEASURED;
-}
 
 // Moves weight between pairs where that lessens the error. `growth` is half the derivative of the blend's mean squared error by each
 // weight.
@@ -124,7 +115,7 @@ void main() {
     off += w[3] * (whole_light(n.rgb, a.rgb, texelFetch(wide_dim, at).rgb) - base) + w[4] * (d.rgb - base);
     bool any_usable = usable[0] || usable[1] || usable[2] || usable[3] || usable[4];
     vec3 all = base + off;
-    float of_mean = own_variance(i, c.w), bright = luminance(all), most = OF_ONE_SAMPLE * max(luminance(d.rgb), 0.0);
+    float of_mean = own_variance(at, c.w), bright = luminance(all), most = OF_ONE_SAMPLE * max(luminance(d.rgb), 0.0);
     bool dominated = usable[4] && c.w >= ENOUGH_TO_TELL_ONE && of_mean >= 0.0 && sqrt(of_mean) > DOMINATED * abs(luminance(c.rgb));
     if (dominated && bright > most) all *= most / bright;
     blend[i] = any_usable ? vec4(all, of_mean) : vec4(vec3(0.0), UNFILTERED);

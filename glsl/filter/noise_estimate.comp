@@ -13,9 +13,8 @@ layout(scalar, binding = 3) writeonly buffer Estimates { vec4 estimate[]; };
 layout(scalar, push_constant) uniform Push { SvgfPush push; };
 
 #include "shared/packed_pixels.glsl"
-#include "shared/variance_at.glsl"
+#include "shared/own_variance.glsl"
 
-layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 layout(constant_id = 115) const bool CAUTIOUS = true;
 const int REACH = 3;
 // Samples that are all dark by chance seem not to vary, so that such pixels would be left dark. Cautious readers take the variance that
@@ -24,15 +23,7 @@ const int REACH = 3;
 const float PRIOR = 4.0;
 const float MANY = 16.0;
 
-// What a pixel's samples say of the variance of its luminance; -1 where they say nothing.
-float told(int i, float count) {
-    vec3 v = MEASURED ? variance_at(i) : vec3(-1.0);
-    // Channels of one path rise and fall together: their deviations add, not their variances.
-    float deviation = min(luminance(sqrt(v)), STRONGEST);
-    return count >= ENOUGH && finite(v) && all(greaterThanEqual(v, vec3(0.0))) ? deviation * deviation : -1.0;
-}
-
-// The means of that over like pixels.
+// The means over like pixels of what their samples say of their variance.
 float[ROWS] told_around(ivec2 first, Pixel p[ROWS]) {
     ivec2 size = ivec2(push.size);
     float total[ROWS], sum[ROWS];
@@ -44,7 +35,7 @@ float[ROWS] told_around(ivec2 first, Pixel p[ROWS]) {
             ivec2 tap = first + ivec2(i, j), inside = clamp(tap, ivec2(0), size - 1);
             int there = inside.y * size.x + inside.x;
             Pixel q = pixel_at(there);
-            float of_tap = told(there, q.colour.w);
+            float of_tap = own_variance(there, q.colour.w);
             bool counts = tap == inside && of_tap >= 0.0;
             [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
                 if (abs(j - k) <= REACH) {
@@ -103,7 +94,7 @@ void main() {
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         int i = min(first + k, size.y - 1) * size.x + x;
         p[k] = pixel_at(i);
-        own[k] = told(i, p[k].colour.w);
+        own[k] = own_variance(i, p[k].colour.w);
         untold = untold || own[k] < 0.0;
         unsure = unsure || own[k] >= 0.0 && p[k].colour.w < MANY;
     }

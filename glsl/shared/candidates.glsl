@@ -31,5 +31,4 @@ float share_of_noise(vec4 found) {
     return found.y > 0.0 ? clamp(TRUST * found.x / found.y, LEAST_SHARE, 1.0) : 1.0;
 }
 
-// Instead of the variance that comes with the blend.
-const float UNMEASURED = -1.0, UNFILTERED = -2.0;
+const float UNFILTERED = -2.0; // stands where the variance of a pixel would, if no candidate could fill it

@@ -10,6 +10,7 @@ use crate::math::srgb::luminance;
 use crate::shaders::noise_estimate::{self, Bind, Constants, MANY, PRIOR};
 pub use crate::shaders::shared::luminance::ENOUGH;
 use crate::shaders::shared::luminance::STRONGEST;
+use crate::shaders::shared::own_variance;
 use crate::threads::each;
 use glam::Vec3;
 
@@ -33,7 +34,10 @@ impl Estimate {
     pub fn new(gpu: &Gpu, edge: &EdgeSettings, cautious: bool, [width, height]: [u32; 2]) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
         let (edge, local_size_x) = (rates.constants(), gpu.tuning().filter_workgroup);
-        let kernel = |measured| Kernel::new(gpu, &Constants { edge, local_size_x, measured, cautious });
+        let kernel = |measured| {
+            let own_variance = own_variance::Constants { measured };
+            Kernel::new(gpu, &Constants { edge, local_size_x, own_variance, cautious })
+        };
         Ok(Self {
             kernels: each([false, true], kernel)?,
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
@@ -61,7 +65,7 @@ pub fn contrast(a: Vec3, b: Vec3) -> f32 {
 /// The variance of every pixel's luminance; -1 where nothing is known. `cautious` as in the kernel.
 pub fn reference(input: &FilterInput, image: &[Packed], edge: &EdgeSettings, cautious: bool) -> Vec<f32> {
     let rates = Rates::of_surfaces(edge);
-    let own: Vec<Option<f32>> = (0..image.len()).map(|at| told(input, image, at)).collect();
+    let own: Vec<Option<f32>> = (0..image.len()).map(|at| own_variance(input, at, image[at].count)).collect();
     let variance = |at: usize| match own[at] {
         _ if image[at].count == 0.0 => -1.0,
         Some(of_pixel) if cautious && image[at].count < MANY => {
@@ -74,10 +78,10 @@ pub fn reference(input: &FilterInput, image: &[Packed], edge: &EdgeSettings, cau
     (0..image.len()).map(variance).collect()
 }
 
-/// What a pixel's samples say of the variance of its luminance.
-fn told(input: &FilterInput, image: &[Packed], at: usize) -> Option<f32> {
+/// What the `count` samples of a pixel say of the variance of its luminance.
+pub fn own_variance(input: &FilterInput, at: usize, count: f32) -> Option<f32> {
     let v = Vec3::from(input.variance.as_ref()?[at]);
-    let measured = image[at].count >= ENOUGH && v.is_finite() && v.min_element() >= 0.0;
+    let measured = count >= ENOUGH && v.is_finite() && v.min_element() >= 0.0;
     measured.then(|| luminance(v.map(f32::sqrt)).min(STRONGEST).powi(2))
 }
 

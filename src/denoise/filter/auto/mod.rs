@@ -1,5 +1,5 @@
 //! Per pixel, the blend of candidates with the least estimated error: it spares the user the sweep. Kernels:
-//! `glsl/auto*.comp`.
+//! `glsl/auto/*.comp`.
 mod reference;
 mod residual;
 mod smoothing;
@@ -17,6 +17,7 @@ use super::{Filter, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{AutoBlendPush, AutoErrorPush, AutoLeveragePush, AutoPush, AutoResidualPush, vec2, vec3, vec4};
+use crate::shaders::shared::own_variance;
 use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual};
 use crate::threads::{both, each};
 
@@ -134,7 +135,10 @@ impl Auto {
         let levels = || Levels::new(gpu, &of_svgf.edge, &of_svgf.svgf, of_svgf.footprint.levels, size, true);
         let estimate = |(edge, cautious)| Estimate::new(gpu, edge, cautious, size);
         let estimates = || each([(&settings.edge, true), (&of_svgf.edge, false)], estimate);
-        let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
+        let blend = |measured| {
+            let own_variance = own_variance::Constants { measured };
+            Kernel::new(gpu, &auto::Constants { own_variance, ..Default::default() })
+        };
         let residual = || Kernel::new(gpu, &auto_residual::Constants { edge: surfaces, local_size_x });
         let ((windows, smoothing), ((svgf, [estimate, svgf_estimate]), (blend, residual))) = both(
             || both(windows, smoothing),

@@ -1,9 +1,9 @@
-//! `auto` on the host: the twin of `glsl/auto*.comp`.
-use super::residual::{given_back, own_variance};
+//! `auto` on the host: the twin of `glsl/auto/*.comp`.
+use super::residual::given_back;
 use super::smoothing::Cells;
 use super::{candidates, floor, shares};
 use crate::denoise::filter::edge::{Rates, edge_weight};
-use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast};
+use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast, own_variance};
 use crate::denoise::filter::pack::Packed;
 use crate::denoise::filter::{FilterInput, FilterSettings, guided, svgf};
 use crate::layout::{vec3, vec4};

@@ -1,12 +1,10 @@
 //! What `auto` gives back of what its blend has lost: the twin of `glsl/auto/auto_residual.comp`.
 use crate::denoise::filter::FilterInput;
 use crate::denoise::filter::edge::{Rates, edge_weight};
-use crate::denoise::filter::noise_estimate::contrast;
+use crate::denoise::filter::noise_estimate::{contrast, own_variance};
 use crate::denoise::filter::pack::Packed;
 use crate::layout::vec4;
-use crate::math::srgb::luminance;
 use crate::shaders::auto_residual::{self, ENOUGH_PIXELS, ENOUGH_SAMPLES, PRIOR_SAMPLES, SIGNIFICANT};
-use crate::shaders::shared::luminance::STRONGEST;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// The blend with what it has lost, where samples show that: twin of `auto_residual.comp`. `prior` is the variance of what is lost.
@@ -66,12 +64,6 @@ impl Window {
         let off = contrast(residual, Vec3::ZERO).abs();
         if off > noise { residual * (1.0 - noise / off) } else { Vec3::ZERO }
     }
-}
-
-/// What the pixel's samples say of the variance of their mean.
-pub fn own_variance(input: &FilterInput, i: usize, count: f32) -> Option<f32> {
-    let v = input.variance.as_ref().map(|v| Vec3::from(v[i])).filter(|v| v.is_finite() && v.min_element() >= 0.0)?;
-    (count >= 2.0).then(|| luminance(v.map(f32::sqrt)).min(STRONGEST).powi(2))
 }
 
 /// What the blend of a pixel differs by from its samples.
