@@ -4,6 +4,11 @@
 #include "shared/segment.glsl"
 #include "shared/luminance.glsl"
 
+layout(binding = 7) uniform usamplerBuffer lights; // of Light
+layout(binding = 8) uniform usamplerBuffer light_table; // of AliasEntry
+layout(binding = 9) uniform samplerBuffer environment; // of vec4
+layout(binding = 10) uniform usamplerBuffer environment_table; // of AliasEntry
+
 struct LightSample {
     vec3 direction; // unit, from the surface to the light
     float distance; // to the offset point on the light, world units; huge for lights at infinity

@@ -7,10 +7,6 @@ layout(binding = 3) uniform usamplerBuffer instances; // of Instance
 layout(binding = 4) uniform usamplerBuffer materials; // of Material
 layout(binding = 5) uniform usamplerBuffer textures; // of Texture
 layout(binding = 6) uniform usamplerBuffer texels; // of uint
-layout(binding = 7) uniform usamplerBuffer lights; // of Light
-layout(binding = 8) uniform usamplerBuffer light_table; // of AliasEntry
-layout(binding = 9) uniform samplerBuffer environment; // of vec4
-layout(binding = 10) uniform usamplerBuffer environment_table; // of AliasEntry
 
 // Matrices that multiply column vectors.
 mat4x3 world_from_object(uint instance) {

@@ -81,6 +81,12 @@ impl DeviceScene {
             materials: &self.materials,
             textures: &self.textures,
             texels: &self.texels,
+        }
+    }
+
+    /// What the kernels bind that choose lights.
+    pub fn bind_lights(&self) -> crate::shaders::shared::light::Bind<'_> {
+        crate::shaders::shared::light::Bind {
             lights: &self.lights,
             light_table: &self.light_table,
             environment: &self.environment,

@@ -8,7 +8,7 @@ use crate::render::upload::whole;
 use crate::scene::Relit;
 use crate::shaders;
 use crate::shaders::shared::probe_cell::PROBE_CELL;
-use crate::shaders::shared::{deal, scene};
+use crate::shaders::shared::{deal, light};
 
 /// The kernels and buffers of probes: one path for each cell of 4x4 pixels, 5 bytes a pixel.
 pub struct Probes {
@@ -93,14 +93,10 @@ impl Probes {
         })
     }
 
-    /// What they bind of a scene.
-    pub fn scene<'a>(&'a self, scene: &'a DeviceScene, after: bool) -> scene::Bind<'a> {
-        match self.relit {
-            None => scene.bind(),
-            Some(_) => {
-                scene::Bind { lights: &self.lights[usize::from(after)], light_table: &self.light_table, ..scene.bind() }
-            }
-        }
+    /// The lights that they choose from, before the scene changes or after it.
+    pub fn lights<'a>(&'a self, scene: &'a DeviceScene, after: bool) -> light::Bind<'a> {
+        let (all, own) = (scene.bind_lights(), &self.lights[usize::from(after)]);
+        self.relit.map_or(all, |_| light::Bind { lights: own, light_table: &self.light_table, ..all })
     }
 
     /// How light has changed in each cell, once all levels are summed.

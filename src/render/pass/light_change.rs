@@ -21,7 +21,8 @@ pub fn trace(
     after: bool,
 ) -> Result<()> {
     let bind = probe::Bind {
-        scene: p.scene(s, after),
+        scene: s.bind(),
+        light: p.lights(s, after),
         frame: s.bind_frame(),
         ray_query: s.bind_world(),
         points: &t.points,

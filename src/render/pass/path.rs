@@ -71,6 +71,7 @@ pub fn record(k: &Paths, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, p
     };
     let bind = Bind {
         scene: s.bind(),
+        light: s.bind_lights(),
         frame: s.bind_frame(),
         ray_query: s.bind_world(),
         which_path: shared::which_path::Bind { paths: &f.paths },

@@ -78,6 +78,7 @@ impl Wavefront {
             rec.dispatch_threads(&self.extend, bind, &push, threads)?; // memory, queue -> memory
             let bind = path_shade::Bind {
                 scene: s.bind(),
+                light: s.bind_lights(),
                 which_path: which_path(),
                 path_memory: path_memory(),
                 path_queue: path_queue(),
