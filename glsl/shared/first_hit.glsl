@@ -27,22 +27,18 @@ Guide guide_of(Ray ray, Hit hit, Surface s, Bsdf bsdf) {
 // Takes the albedo of the surface `s`, and goes on from a smooth one by the stronger way wherever light may take two. Returns false
 // where none goes on.
 bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
-    Facing facing = facing_of(s, bsdf, -sight.way.direction);
-    mat3 basis = shading_basis(s, bsdf, facing.normal);
-    vec3 wo = -sight.way.direction * basis;
-    if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
-    bsdf_view(bsdf, wo);
+    View view = view_of(s, bsdf, facing_of(s, bsdf, -sight.way.direction), -sight.way.direction);
     bool smooth_here = FX_SMOOTH && bsdf_is_delta(bsdf);
     if (!sight.chosen) {
         sight.chosen = smooth_here && bsdf_chooses(bsdf);
-        sight.albedo = min(sight.throughput, vec3(1.0)) * (sight.chosen ? vec3(1.0) : bsdf_albedo(bsdf, wo.z));
+        sight.albedo = min(sight.throughput, vec3(1.0)) * (sight.chosen ? vec3(1.0) : bsdf_albedo(bsdf, view.wo.z));
     }
     if (!smooth_here) return false;
     BsdfSample next;
-    bool goes_on = bsdf_sample(bsdf, wo, 0.5, vec2(0.5), next);
-    sight.way.direction = basis * next.wi;
+    bool goes_on = bsdf_sample(bsdf, view.wo, 0.5, vec2(0.5), next);
+    sight.way.direction = view.basis * next.wi;
     sight.way.origin = ray_origin(s, sight.way.direction);
-    sight.throughput *= next.weight * light_share(s, facing, sight.way.direction, next.wi.z);
+    sight.throughput *= next.weight * light_share(s, view.facing, sight.way.direction, next.wi.z);
     return goes_on && max(sight.throughput.r, max(sight.throughput.g, sight.throughput.b)) > 0.0;
 }
 

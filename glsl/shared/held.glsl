@@ -15,12 +15,9 @@ bool shows(uint pixel, Surface s) {
 // The BSDF towards `wo`, without the cosine, for light from `wi`; both in world space.
 vec3 scattered(Surface s, Bsdf bsdf, vec3 wo, vec3 wi) {
     bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u;
-    Facing facing = facing_normals(s, wo, turns, true);
-    mat3 basis = shading_basis(s, bsdf, facing.normal);
-    vec3 towards = wo * basis, from = wi * basis;
-    if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, towards);
-    bsdf_view(bsdf, towards);
-    return bsdf_evaluate(bsdf, towards, from).rgb / max(from.z, 1e-3);
+    View view = view_of(s, bsdf, facing_normals(s, wo, turns, true), wo);
+    vec3 from = wi * view.basis;
+    return bsdf_evaluate(bsdf, view.wo, from).rgb / max(from.z, 1e-3);
 }
 
 // Largest channel of |f_r(new view) - f_r(old view)| * irradiance (Schalk 2018, equation 15, where the albedo is a factor of its

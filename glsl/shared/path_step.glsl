@@ -35,18 +35,17 @@ vec3 light_from_hit(Path path, Surface s, float t) {
     return FX_EMISSIVE && shines ? surface_emission(s) * weight : vec3(0.0);
 }
 
-// Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed. The columns
-// of `basis` are the shading frame.
-vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
+// Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed.
+vec3 light_from_nee(Surface s, Bsdf bsdf, View view, Sampler random, uint pair, uint mask_seed,
                     out Segment shadow, out bool sharp) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     float beyond_cosine = is_kind(FX_DIFFUSE, bsdf, BSDF_DIFFUSE) ? 0.0 : ODDS_BEYOND_COSINE;
-    Receiver receiver = Receiver(s.position, facing.normal, bsdf_lets_light_through(bsdf), beyond_cosine);
+    Receiver receiver = Receiver(s.position, view.facing.normal, bsdf_lets_light_through(bsdf), beyond_cosine);
     LightSample light = light_sample(receiver, word, sample_2d(random, pair + PAIR_LIGHT));
     sharp = light.sharp;
-    vec3 wi = light.direction * basis; // row vector times matrix: into the frame
-    vec4 f = bsdf_evaluate(bsdf, wo, wi);
-    f.rgb *= light_share(s, facing, light.direction, wi.z);
+    vec3 wi = light.direction * view.basis; // row vector times matrix: into the frame
+    vec4 f = bsdf_evaluate(bsdf, view.wo, wi);
+    f.rgb *= light_share(s, view.facing, light.direction, wi.z);
     mask_seed |= light.pdf == 0.0 ? PASSES_WALLS : 0u;
     shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
     if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
@@ -57,17 +56,17 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sa
 }
 
 // Samples the next direction. Returns false when the path ends.
-bool scatter(inout Path path, Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair) {
+bool scatter(inout Path path, Surface s, Bsdf bsdf, View view, Sampler random, uint pair) {
     BsdfSample next;
     float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
-    bool scattered = bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next);
-    path.direction = basis * next.wi;
-    path.throughput *= next.weight * light_share(s, facing, path.direction, next.wi.z);
+    bool scattered = bsdf_sample(bsdf, view.wo, lobe, sample_2d(random, pair + PAIR_BSDF), next);
+    path.direction = view.basis * next.wi;
+    path.throughput *= next.weight * light_share(s, view.facing, path.direction, next.wi.z);
     path.origin = ray_origin(s, path.direction);
     path.bsdf_pdf = next.pdf;
     path.delta = next.delta;
-    if (FX_ROULETTE && is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC) && wo.z * next.wi.z < 0.0) {
-        float eta = relative_index(bsdf, wo.z);
+    if (FX_ROULETTE && is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC) && view.wo.z * next.wi.z < 0.0) {
+        float eta = relative_index(bsdf, view.wo.z);
         path.eta_scale *= eta * eta;
     }
     return scattered && max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
@@ -100,20 +99,16 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     Departure d;
     uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * p.bounce;
     Bsdf bsdf = surface_bsdf(s);
-    Facing facing = facing_of(s, bsdf, -p.path.direction);
-    mat3 basis = shading_basis(s, bsdf, facing.normal);
-    vec3 wo = -p.path.direction * basis;
-    if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
-    bsdf_view(bsdf, wo);
+    View view = view_of(s, bsdf, facing_of(s, bsdf, -p.path.direction), -p.path.direction);
     bool smooth_here = bsdf_is_delta(bsdf);
     if (p.scattered == 0u && !p.chosen && going) {
         p.chosen = smooth_here && bsdf_chooses(bsdf);
-        p.albedo = min(p.path.throughput, vec3(1.0)) * (p.chosen ? vec3(1.0) : bsdf_albedo(bsdf, wo.z)); // roulette may exceed 1
+        p.albedo = min(p.path.throughput, vec3(1.0)) * (p.chosen ? vec3(1.0) : bsdf_albedo(bsdf, view.wo.z)); // roulette may exceed 1
     }
     uint seed = shadow_mask_seed(p.seed, p.bounce);
-    d.sampled = p.path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, seed, d.shadow, d.sharp);
+    d.sampled = p.path.throughput * light_from_nee(s, bsdf, view, random, pair, seed, d.shadow, d.sharp);
     d.shadowed = going && push.constants.light_count > 0u && !smooth_here && max(d.sampled.r, max(d.sampled.g, d.sampled.b)) > 0.0;
-    d.alive = scatter(p.path, s, bsdf, facing, basis, wo, random, pair) && going;
+    d.alive = scatter(p.path, s, bsdf, view, random, pair) && going;
     p.scattered += smooth_here ? 0u : 1u;
     // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for what is sharp there.
     bool ends = FX_SPARSE && p.sharp_only && p.scattered > (FX_SOFT ? 0u : 1u);

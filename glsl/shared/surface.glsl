@@ -257,6 +257,22 @@ vec3 local_coat_normal(Surface s, Facing f, mat3 basis, vec3 wo) {
     return dot(n, wo) > MIN_ELEVATION ? n : UP;
 }
 
+// A surface as a viewer sees it: the frame of its lobes, and the viewer in that frame.
+struct View {
+    Facing facing;
+    mat3 basis; // its columns are the shading frame
+    vec3 wo;    // unit, to the viewer, in that frame
+};
+
+// For a viewer towards `towards`, in world space. Prepares `bsdf` to be evaluated and sampled.
+View view_of(Surface s, inout Bsdf bsdf, Facing facing, vec3 towards) {
+    mat3 basis = shading_basis(s, bsdf, facing.normal);
+    vec3 wo = towards * basis; // row vector times matrix: into the frame
+    if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
+    bsdf_view(bsdf, wo);
+    return View(facing, basis, wo);
+}
+
 // Share of the light along `w` that lobes around `facing.normal` keep; `z` is the component of `w` along that normal. It is 0
 // where the plane and the normal disagree about the side of `w`, or an opaque surface would see its own inside. Maps shadow
 // themselves (Conty Estevez, Lecocq and Stein 2019, Ray Tracing Gems, chapter 12).

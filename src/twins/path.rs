@@ -15,11 +15,10 @@ use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
 use crate::twins::sampler::{Sampler, sample_2d, sample_2d_bits, sampler_start};
 use crate::twins::surface::{
-    Facing, Surface, facing_of, light_share, local_coat_normal, shading_basis, surface_at, surface_bsdf,
-    surface_emission,
+    Surface, View, facing_of, light_share, surface_at, surface_bsdf, surface_emission, view_of,
 };
 use crate::twins::traverse::{Hit, light_left, traverse, traverse_from};
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 
 pub use crate::shaders::shared::path_step::SHADOW_END;
 use crate::shaders::shared::segment::PASSES_WALLS;
@@ -128,9 +127,7 @@ pub struct Tracer<'a> {
 struct Shade {
     surface: Surface,
     bsdf: Bsdf,
-    facing: Facing,
-    basis: Mat3,
-    wo: Vec3,
+    view: View,
     pair: u32,
     /// Triangle and instance that the next ray leaves.
     from: [u32; 2],
@@ -185,7 +182,7 @@ impl Tracer<'_> {
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
         let receiver = Receiver {
             position: s.position,
-            normal: p.facing.normal,
+            normal: p.view.facing.normal,
             lets_light_through: bsdf_lets_light_through(&p.bsdf),
             odds_beyond_cosine: if p.bsdf.kind == BSDF_DIFFUSE { 0.0 } else { ODDS_BEYOND_COSINE },
         };
@@ -193,9 +190,9 @@ impl Tracer<'_> {
         if light.radiance == Vec3::ZERO {
             return None;
         }
-        let wi = p.basis.transpose() * light.direction;
-        let f = bsdf_evaluate(&p.bsdf, p.wo, wi);
-        let share = light_share(s, &p.facing, light.direction, wi.z);
+        let wi = p.view.basis.transpose() * light.direction;
+        let f = bsdf_evaluate(&p.bsdf, p.view.wo, wi);
+        let share = light_share(s, &p.view.facing, light.direction, wi.z);
         let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
         let contribution = f.truncate() * share * light.radiance * weight;
         if contribution.max_element() <= 0.0 || contribution.is_nan() {
@@ -214,17 +211,17 @@ impl Tracer<'_> {
 
     fn scatter(&self, path: &mut Path, p: &Shade, random: Sampler) -> bool {
         let lobe = sample_2d(random, p.pair + PAIR_CHOICE).y;
-        let (scattered, next) = bsdf_sample(&p.bsdf, p.wo, lobe, sample_2d(random, p.pair + PAIR_BSDF));
+        let (scattered, next) = bsdf_sample(&p.bsdf, p.view.wo, lobe, sample_2d(random, p.pair + PAIR_BSDF));
         if !scattered {
             return false;
         }
-        path.direction = p.basis * next.wi;
-        path.throughput *= next.weight * light_share(&p.surface, &p.facing, path.direction, next.wi.z);
+        path.direction = p.view.basis * next.wi;
+        path.throughput *= next.weight * light_share(&p.surface, &p.view.facing, path.direction, next.wi.z);
         path.origin = p.surface.ray_origin(path.direction);
         path.bsdf_pdf = next.pdf;
         path.delta = next.delta;
-        if p.bsdf.kind == BSDF_DIELECTRIC && p.wo.z * next.wi.z < 0.0 {
-            path.eta_scale *= relative_index(&p.bsdf, p.wo.z).powi(2);
+        if p.bsdf.kind == BSDF_DIELECTRIC && p.view.wo.z * next.wi.z < 0.0 {
+            path.eta_scale *= relative_index(&p.bsdf, p.view.wo.z).powi(2);
         }
         path.throughput.max_element() > 0.0
     }
@@ -241,12 +238,8 @@ impl Tracer<'_> {
     fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
         let mut bsdf = surface_bsdf(self.scene, &surface);
         let facing = facing_of(&surface, &bsdf, -direction);
-        let basis = shading_basis(&surface, &bsdf, facing.normal);
-        let wo = basis.transpose() * -direction;
-        if self.effects.coat_normals {
-            bsdf.metallic.coat_normal = local_coat_normal(&surface, &facing, &basis, wo);
-        }
-        Shade { bsdf, surface, facing, basis, wo, pair, from }
+        let view = view_of(&surface, &mut bsdf, facing, -direction);
+        Shade { bsdf, surface, view, pair, from }
     }
 
     /// `first` is what the path's first ray finds. A path that is `sharp_only` ends where only light can come that a filter takes.
@@ -276,7 +269,7 @@ impl Tracer<'_> {
             let smooth_here = bsdf_is_delta(&p.bsdf);
             if seen.scattered == 0 && !seen.chosen {
                 seen.chosen = smooth_here && bsdf_chooses(&p.bsdf);
-                let albedo = if seen.chosen { Vec3::ONE } else { bsdf_albedo(&p.bsdf, p.wo.z) };
+                let albedo = if seen.chosen { Vec3::ONE } else { bsdf_albedo(&p.bsdf, p.view.wo.z) };
                 seen.albedo = path.throughput.min(Vec3::ONE) * albedo;
             }
             seen.scattered += u32::from(!smooth_here);

@@ -5,9 +5,7 @@ use crate::scene::Scene;
 use crate::twins::bsdf::{bsdf_albedo, bsdf_chooses, bsdf_is_delta, bsdf_sample};
 use crate::twins::camera::{Ray, camera_ray, film_from_pixel};
 use crate::twins::light::INFINITE_DISTANCE;
-use crate::twins::surface::{
-    facing_of, light_share, local_coat_normal, shading_basis, side_of, surface_at, surface_bsdf,
-};
+use crate::twins::surface::{View, facing_of, light_share, side_of, surface_at, surface_bsdf, view_of};
 use crate::twins::texture::mask_bits;
 use crate::twins::traverse::{Hit, traverse};
 use glam::{Vec2, Vec3, vec2};
@@ -88,9 +86,7 @@ impl Sight {
         let s = surface_at(scene, hit);
         let mut bsdf = surface_bsdf(scene, &s);
         let facing = facing_of(&s, &bsdf, -self.way.direction);
-        let basis = shading_basis(&s, &bsdf, facing.normal);
-        let wo = basis.transpose() * -self.way.direction;
-        bsdf.metallic.coat_normal = local_coat_normal(&s, &facing, &basis, wo);
+        let View { facing, basis, wo } = view_of(&s, &mut bsdf, facing, -self.way.direction);
         let smooth_here = bsdf_is_delta(&bsdf);
         if !self.chosen {
             self.chosen = smooth_here && bsdf_chooses(&bsdf);

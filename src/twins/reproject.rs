@@ -12,7 +12,7 @@ use crate::shaders::shared::history::*;
 use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_albedo, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
 use crate::twins::light_change::{light_around, probe_cell_of, square};
-use crate::twins::surface::{Surface, facing_normals, shading_basis, surface_at, surface_bsdf};
+use crate::twins::surface::{Surface, facing_normals, surface_at, surface_bsdf, view_of};
 use crate::twins::traverse::Hit;
 use glam::{Vec2, Vec3, Vec4, vec2};
 use std::f32::consts::PI;
@@ -98,9 +98,10 @@ fn is_sharp(b: &Bsdf) -> bool {
 /// The BSDF towards `wo`, without the cosine, for light from `wi`.
 fn scattered(s: &Surface, bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> Vec3 {
     let facing = facing_normals(s, wo, s.flags & MATERIAL_TWO_SIDED != 0, true);
-    let to_local = shading_basis(s, bsdf, facing.normal).transpose();
-    let (towards, from) = (to_local * wo, to_local * wi);
-    bsdf_evaluate(bsdf, towards, from).truncate() / from.z.max(1e-3)
+    let mut bsdf = *bsdf;
+    let view = view_of(s, &mut bsdf, facing, wo);
+    let from = view.basis.transpose() * wi;
+    bsdf_evaluate(&bsdf, view.wo, from).truncate() / from.z.max(1e-3)
 }
 
 impl Reprojection<'_> {

@@ -335,13 +335,32 @@ pub fn shading_basis(s: &Surface, b: &Bsdf, n: Vec3) -> Mat3 {
 }
 
 /// The normal of a clear coat in the frame `basis`; that of the frame where the viewer towards `wo` would be below it.
-pub fn local_coat_normal(s: &Surface, facing: &Facing, basis: &Mat3, wo: Vec3) -> Vec3 {
+fn local_coat_normal(s: &Surface, facing: &Facing, basis: &Mat3, wo: Vec3) -> Vec3 {
     let n = match facing.smooth_normal.dot(s.smooth_normal) < 0.0 {
         _ if s.coat_normal == s.smooth_normal => facing.smooth_normal,
         turned => s.coat_normal * if turned { -1.0 } else { 1.0 },
     };
     let n = basis.transpose() * n;
     if n.dot(wo) > MIN_ELEVATION { n } else { Vec3::Z }
+}
+
+/// A surface as a viewer sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Normals on the viewer's side.
+    pub facing: Facing,
+    /// Its columns are the shading frame.
+    pub basis: Mat3,
+    /// Unit vector to the viewer, in that frame.
+    pub wo: Vec3,
+}
+
+/// For a viewer towards `towards`, in world space. Prepares `bsdf` to be evaluated and sampled.
+pub fn view_of(s: &Surface, bsdf: &mut Bsdf, facing: Facing, towards: Vec3) -> View {
+    let basis = shading_basis(s, bsdf, facing.normal);
+    let wo = basis.transpose() * towards;
+    bsdf.metallic.coat_normal = local_coat_normal(s, &facing, &basis, wo);
+    View { facing, basis, wo }
 }
 
 /// Share of the light along `w` that lobes around `facing.normal` keep; `z` is the component of `w` along that normal.

@@ -311,6 +311,28 @@ fn kernels_agree_with_their_twin() {
     assert_silent(&gpu);
 }
 
+#[test]
+fn coats_with_normals_of_their_own_agree_with_their_twin() {
+    let gpu = gpu();
+    let mut scene = Workplace::new().picture("waves.png", 8, |x, y| [90 + 20 * (x % 4) as u8, 165 - 20 * (y % 4) as u8, 240]).scene(
+        "[camera]\nposition = [0.0, 3.0, 6.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n[environment]\nradiance = 1.0\n\
+         [[material]]\nname = 'coated'\ntype = 'metallic-roughness'\nroughness = 0.9\nclearcoat = 1.0\n\
+         clearcoat_roughness = 0.5\nclearcoat_normal_map = 'waves.png'\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'coated'\ntransform = { scale = 9.0 }\n",
+    );
+    (scene.settings.width, scene.settings.height, scene.settings.spp) = (49, 33, 3);
+    for way in WAYS {
+        let mut film = Film::new(&gpu, &scene, by(way));
+        film.frame(film.camera);
+        let camera = shifted(film.camera, [0.1, 0.0, 0.0]);
+        let begun = both(&mut film, &scene, by(way), camera);
+        let (n, agree) = (begun[0].0.len(), agreeing(&begun));
+        let accounted = begun[0].0.iter().filter(|&&word| Carried::of(word).error > 0).count();
+        assert!(agree * 50 >= n * 49 && accounted * 2 > n, "{way:?}: {agree} and {accounted} of {n}");
+    }
+    assert_silent(&gpu);
+}
+
 fn agree(gpu: &Gpu, settings: Reproject) {
     let loose = Reproject { reproject_error: 1e3, reproject_aliasing: 1e9, ..settings };
     let accounted = Reproject { reproject_error: 0.05, ..loose }; // some of its parts
