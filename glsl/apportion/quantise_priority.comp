@@ -6,9 +6,9 @@
 // exact. A priority that is not finite gets weight 0 and is counted. A workgroup sums one block; the last
 // one starts the apportionment by the sums of all.
 //
-// The passes in order: quantise_priority; then, where weights are shares or errors, lack_of_share or lack_of_accuracy; quota,
-// repeated; radix_select for each of the remainders' 8 digits; tie_sums, give_remainders. The scan of the counts follows: reduce,
-// offsets; and sample_list for every batch. The method is Hamilton's (largest remainders), with an upper limit for every pixel.
+// The passes in order: quantise_priority; then lack, where weights are shares or errors; quota, repeated; radix_select for each of
+// the remainders' 8 digits; tie_sums, give_remainders. The scan of the counts follows: reduce, offsets; and sample_list for every
+// batch. The method is Hamilton's (largest remainders), with an upper limit for every pixel.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer priority; // of float
 layout(scalar, binding = 1) writeonly buffer Weights { uint weight[]; };
@@ -36,12 +36,9 @@ void main() {
     }
     uint64_t weights = block_sum(total);
     uvec2 counts = unpackUint2x32(block_sum(packUint2x32(uvec2(broken, positive))));
-    if (gl_LocalInvocationIndex == 0u) {
-        BlockSums sum = BlockSums_zero();
-        sum.weights = unpackUint2x32(weights);
-        sum.settled = counts.x;
-        sum.open = counts.y;
-        sums[gl_WorkGroupID.x] = sum;
-    }
-    start_apportionment(false);
+    BlockSums sum = BlockSums_zero();
+    sum.weights = unpackUint2x32(weights);
+    sum.settled = counts.x;
+    sum.open = counts.y;
+    start_apportionment(sum, false);
 }

@@ -1,10 +1,11 @@
-// Starts an apportionment by the weights that are in `sums`. Needs `sums`, `state` and `push`.
+// Starts an apportionment by weights, which are summed in `sums`. Needs `sums`, `state` and `push`.
 #include "shared/last_block.glsl"
 #include "shared/proportion.glsl"
 
-// To be called by all threads once their block's sums are written; the last workgroup does it. `again`: after the weights were replaced
-// by what pixels lack.
-void start_apportionment(bool again) {
+// To be called by all threads with the sums of their block; the last workgroup does it. `again`: after the weights were replaced by what
+// pixels lack.
+void start_apportionment(BlockSums sum, bool again) {
+    if (gl_LocalInvocationIndex == 0u) sums[gl_WorkGroupID.x] = sum;
     if (!is_last_block()) return; // safe: the same for all threads
     uint blocks = block_count(push.pixels);
     uint64_t weights = 0UL, counts = 0UL;

@@ -2,10 +2,12 @@
 //! results equal the kernels' exactly.
 use crate::layout::NONE;
 use crate::math::hash::pcg;
+use crate::shaders::lack::INITIAL_SAMPLES;
+use crate::shaders::quantise_priority::{FIXED_POINT, MAX_PRIORITY};
 
 /// Priorities as 12.20 fixed point, and the number of those that are not finite, whose weight is 0.
 pub fn weigh(priority: &[f32]) -> (Vec<u32>, u32) {
-    let weight = |p: &f32| if p.is_finite() && *p > 0.0 { (p.min(4095.0) * 1_048_576.0) as u32 } else { 0 };
+    let weight = |p: &f32| if p.is_finite() && *p > 0.0 { (p.min(MAX_PRIORITY) * FIXED_POINT) as u32 } else { 0 };
     let broken = priority.iter().filter(|p| !p.is_finite()).count();
     (priority.iter().map(weight).collect(), broken as u32)
 }
@@ -33,11 +35,11 @@ pub fn deficit(weights: &[u32], have: &[u32], total: u64) -> Vec<u32> {
 }
 
 /// Samples that pixels lack until weight / sqrt(n) reaches the threshold, both 12.20 fixed point:
-/// ceil((w / t)^2) - have, at least 1 and at most max(have, 4) and what is left of `enough`; 0 of a weight of 0.
+/// ceil((w / t)^2) - have, at least 1 and at most max(have, [`INITIAL_SAMPLES`]) and what is left of `enough`; 0 of a weight of 0.
 pub fn need(weights: &[u32], have: &[u32], threshold: u32, enough: u32) -> Vec<u32> {
     let lack = |(&w, &have): (&u32, &u32)| {
         let wanted = (u64::from(w) * u64::from(w)).div_ceil(u64::from(threshold) * u64::from(threshold));
-        let most = have.max(4).min(enough.saturating_sub(have));
+        let most = have.max(INITIAL_SAMPLES).min(enough.saturating_sub(have));
         let lacks = wanted.saturating_sub(u64::from(have)).clamp(1, 1 << 31) as u32;
         if w == 0 { 0 } else { lacks.min(most) }
     };

@@ -43,8 +43,7 @@ enum What {
 const TIMED: [&str; 6] = ["atrous", "svgf", "wavelet", "bilateral", "guided", "auto"];
 
 /// Passes that place samples and depend on [`Tuning::interleaves`].
-const PLACING: [&str; 6] =
-    ["quantise_priority", "lack_of_share", "lack_of_accuracy", "quota", "radix_select", "reduce"];
+const PLACING: [&str; 5] = ["quantise_priority", "lack", "quota", "radix_select", "reduce"];
 
 /// A choice by its name, on a device that was opened for it.
 type Choice = (String, Gpu);

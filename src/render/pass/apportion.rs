@@ -4,8 +4,8 @@
 //! ```text
 //! priority -> quantise_priority       weights in fixed point, and their sum
 //!                  |
-//!          lack_of_share or           only where past samples count: what is missing of a share of all samples,
-//!          lack_of_accuracy           or of an accuracy, and the sum of that
+//!                lack                only where past samples count: what is missing of a share of all samples, or of an
+//!                  |                 accuracy, and the sum of that
 //!                  |
 //!       +-----> quota -----+          whole samples: floor(budget * weight / sum). What full pixels leave is apportioned again
 //!       +- `rounds` times -+
@@ -23,9 +23,8 @@ use crate::gpu::PerBlock;
 use crate::gpu::{Buffer, Gpu, Recorder};
 use crate::layout::{ApportionPush, NONE, PixelStats};
 use crate::render::schedule::{Plan, Share};
-use crate::shaders::{
-    give_remainders, lack_of_accuracy, lack_of_share, quantise_priority, quota, radix_select, tie_sums,
-};
+use crate::shaders::quantise_priority::{FIXED_POINT, MAX_PRIORITY};
+use crate::shaders::{give_remainders, lack, quantise_priority, quota, radix_select, tie_sums};
 
 /// Digits of a remainder, and the values of each.
 const DIGITS: u32 = 8;
@@ -33,8 +32,7 @@ const DIGITS: u32 = 8;
 /// The kernels.
 pub struct Apportion {
     weigh: PerBlock<quantise_priority::Bind<'static>>,
-    deficit: PerBlock<lack_of_share::Bind<'static>>,
-    need: PerBlock<lack_of_accuracy::Bind<'static>>,
+    lack: PerBlock<lack::Bind<'static>>,
     quota: PerBlock<quota::Bind<'static>>,
     pick: PerBlock<radix_select::Bind<'static>>,
     ties: PerBlock<tie_sums::Bind<'static>>,
@@ -49,8 +47,7 @@ impl Apportion {
     pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
         Ok(Self {
             weigh: PerBlock::new(gpu, thread_items)?,
-            deficit: PerBlock::new(gpu, thread_items)?,
-            need: PerBlock::new(gpu, thread_items)?,
+            lack: PerBlock::new(gpu, thread_items)?,
             quota: PerBlock::new(gpu, thread_items)?,
             pick: PerBlock::new(gpu, thread_items)?,
             ties: PerBlock::new(gpu, thread_items)?,
@@ -67,16 +64,9 @@ impl Apportion {
         let (sums, state, last_block) = (&c.sums, &c.state, c.last_block());
         let bind = quantise_priority::Bind { priority: &c.priority, weight: &c.weight, sums, state, last_block };
         self.weigh.record(rec, bind, &push(0), n)?;
-        match plan.share {
-            Share::Next => {}
-            Share::All(_) => {
-                let bind = lack_of_share::Bind { stats, state, weight: &c.weight, sums, last_block };
-                self.deficit.record(rec, bind, &push(0), n)?;
-            }
-            Share::Need { .. } => {
-                let bind = lack_of_accuracy::Bind { stats, weight: &c.weight, sums, state, last_block };
-                self.need.record(rec, bind, &push(0), n)?;
-            }
+        if !matches!(plan.share, Share::Next) {
+            let bind = lack::Bind { stats, state, weight: &c.weight, sums, last_block };
+            self.lack.record(rec, bind, &push(0), n)?;
         }
         for round in 0..plan.rounds {
             let (weight, key, count) = (&c.weight, &c.offset, &c.count);
@@ -102,7 +92,7 @@ impl Apportion {
 
 /// As priorities are counted in weights, 12.20 fixed point; at least the least.
 pub fn fixed_threshold(threshold: f32) -> u32 {
-    ((threshold.min(4095.0) * 1_048_576.0) as u32).max(1)
+    ((threshold.min(MAX_PRIORITY) * FIXED_POINT) as u32).max(1)
 }
 
 fn push(plan: &Plan, step: u32) -> ApportionPush {
