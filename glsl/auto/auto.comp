@@ -25,7 +25,7 @@ layout(binding = 11) uniform samplerBuffer surroundings; // of vec4, of auto_lev
 layout(binding = 12) uniform samplerBuffer leverages; // of vec4, the same, not smoothed
 layout(scalar, binding = 13) writeonly buffer Blend { vec4 blend[]; };
 layout(scalar, binding = 14) writeonly buffer Expected { vec3 expected[]; };
-layout(scalar, push_constant) uniform Push { AutoBlendPush push; };
+layout(scalar, push_constant) uniform Push { AutoPush push; };
 
 #include "shared/own_variance.glsl"
 
@@ -63,7 +63,7 @@ void exchange(inout float w[5], inout float growth[5], float missed[5][5], bool 
 
 void main() {
     uint i = thread_index();
-    if (i >= push.count) return;
+    if (i >= push.size.x * push.size.y) return;
     int at = int(i);
     vec4 c = texelFetch(colour, at);
     vec4 a = texelFetch(wide, at), b = texelFetch(mid, at), n = texelFetch(narrow, at), d = texelFetch(svgf, at);

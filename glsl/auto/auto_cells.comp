@@ -6,7 +6,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Cells { uvec4 cells[]; };
-layout(scalar, push_constant) uniform Push { AutoCellsPush push; };
+layout(scalar, push_constant) uniform Push { SizePush push; };
 
 void main() {
     ivec2 size = ivec2(push.size), grid = smoothing_cells_of(push.size), cell = ivec2(gl_GlobalInvocationID.xy);

@@ -19,7 +19,7 @@ layout(binding = 8) uniform samplerBuffer surroundings; // of vec4
 layout(scalar, binding = 9) writeonly buffer Squares { vec4 squares[]; };    // wide, mid, narrow, svgf
 layout(scalar, binding = 10) writeonly buffer Products { vec4 products[]; }; // wide mid, wide narrow, wide svgf, mid narrow
 layout(scalar, binding = 11) writeonly buffer Others { vec4 others[]; };     // mid svgf, narrow svgf, none, the light itself
-layout(scalar, push_constant) uniform Push { AutoErrorPush push; };
+layout(scalar, push_constant) uniform Push { AutoPush push; };
 
 const float MOST = 0.9; // largest leverage: beyond it, too little is left to judge by
 // How far the leverage used moves from the smoothed one towards the pixel's own, larger one, at one sample. Both a pixel's
@@ -66,7 +66,7 @@ float variance_around(ivec2 at) {
 
 void main() {
     uint i = thread_index();
-    if (i >= push.count) return;
+    if (i >= push.size.x * push.size.y) return;
     int at = int(i);
     vec4 e = texelFetch(estimate, at);
     vec3 a = texelFetch(wide, at).rgb, b = texelFetch(mid, at).rgb, c = texelFetch(narrow, at).rgb;

@@ -19,7 +19,7 @@ layout(binding = 5) uniform usamplerBuffer place; // of uvec4
 layout(binding = 6) uniform samplerBuffer estimate; // of vec4
 // Squared second differences, what variances tell of them, leverages in the narrow window and in svgf.
 layout(scalar, binding = 7) writeonly buffer Output { vec4 leverages[]; };
-layout(scalar, push_constant) uniform Push { AutoLeveragePush push; };
+layout(scalar, push_constant) uniform Push { AutoPush push; };
 
 #include "shared/packed_pixels.glsl"
 
@@ -41,7 +41,7 @@ vec2 differences(ivec2 at, ivec2 along) {
 
 void main() {
     uint i = thread_index();
-    if (i >= push.count) return;
+    if (i >= push.size.x * push.size.y) return;
     int at = int(i);
     float added = perturbation(i, texelFetch(wide, at).rgb, push.floor);
     float grown = contrast(texelFetch(probed, at).rgb, texelFetch(svgf, at).rgb);

@@ -13,7 +13,7 @@ layout(binding = 2) uniform samplerBuffer estimate; // of vec4
 layout(binding = 3) uniform samplerBuffer others; // of vec4
 layout(binding = 4) uniform samplerBuffer blend; // of vec4, of auto.comp
 layout(scalar, binding = 5) writeonly buffer Output { vec4 filtered[]; };
-layout(scalar, push_constant) uniform Push { AutoResidualPush push; };
+layout(scalar, push_constant) uniform Push { AutoPush push; };
 
 #include "shared/packed_pixels.glsl"
 

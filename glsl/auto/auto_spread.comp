@@ -13,7 +13,7 @@ layout(binding = 5) uniform samplerBuffer third; // of vec4
 layout(scalar, binding = 6) writeonly buffer First { vec4 first_spread[]; };
 layout(scalar, binding = 7) writeonly buffer Second { vec4 second_spread[]; };
 layout(scalar, binding = 8) writeonly buffer Third { vec4 third_spread[]; };
-layout(scalar, push_constant) uniform Push { AutoSpreadPush push; };
+layout(scalar, push_constant) uniform Push { SurfacesPush push; };
 
 #include "shared/packed_pixels.glsl"
 

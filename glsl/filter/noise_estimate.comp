@@ -10,7 +10,7 @@ layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(binding = 2) uniform samplerBuffer variance; // of vec3
 layout(scalar, binding = 3) writeonly buffer Estimates { vec4 estimate[]; };
-layout(scalar, push_constant) uniform Push { SvgfPush push; };
+layout(scalar, push_constant) uniform Push { SurfacesPush push; };
 
 #include "shared/packed_pixels.glsl"
 #include "shared/own_variance.glsl"

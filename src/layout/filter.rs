@@ -3,7 +3,7 @@ use super::{Field, Struct, float, uint, uvec2, vec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
-    /// Push constants of `demodulate.comp`, `as_light.comp` and `expected_error.comp`.
+    /// Push constants of `demodulate.comp`, `as_light.comp`, `auto_cells.comp` and `expected_error.comp`.
     struct SizePush {
         /// Film in pixels.
         size: uvec2,
@@ -71,7 +71,7 @@ gpu_structs! {
         band_rows: uint,
     }
 
-    /// Push constants of `noise_estimate.comp` and `svgf.comp`.
+    /// Push constants of `svgf.comp`.
     struct SvgfPush {
         /// Image in pixels.
         size: uvec2,
@@ -103,64 +103,20 @@ gpu_structs! {
         factor: float,
     }
 
-    /// Push constants of `auto_leverage.comp`.
-    struct AutoLeveragePush {
-        /// Pixels of the image.
-        count: uint,
-        /// As in [`AutoPush`].
-        floor: float,
-        /// Image in pixels.
-        size: uvec2,
-        /// As in [`AtrousPush`]; that of radiance is 0.
-        rates: vec3,
-    }
-
-    /// Push constants of `auto.comp`.
-    struct AutoBlendPush {
-        /// Pixels of the image.
-        count: uint,
-        /// As in [`AutoErrorPush`].
-        shares: vec2,
-    }
-
-    /// Push constants of `auto_error.comp`.
-    struct AutoErrorPush {
-        /// Pixels of the image.
-        count: uint,
-        /// As in [`AutoPush`].
-        floor: float,
-        /// Image in pixels.
-        size: uvec2,
-        /// Pixels of the narrow window over those of the wide and of the middle one.
-        shares: vec2,
-    }
-
-    /// Push constants of `auto_inputs.comp`.
+    /// Push constants of `auto_inputs.comp`, `auto_leverage.comp`, `auto_error.comp`, `auto.comp` and `auto_residual.comp`.
     struct AutoPush {
         /// Image in pixels.
         size: uvec2,
         /// Luminance below which errors count as absolute.
         floor: float,
-    }
-
-    /// Push constants of `auto_residual.comp`.
-    struct AutoResidualPush {
-        /// Image in pixels.
-        size: uvec2,
-        /// As in [`AutoPush`].
-        floor: float,
         /// As in [`AtrousPush`]; that of radiance is 0.
         rates: vec3,
+        /// Pixels of the narrow window over those of the wide and of the middle one.
+        shares: vec2,
     }
 
-    /// Push constants of `auto_cells.comp`.
-    struct AutoCellsPush {
-        /// Image in pixels.
-        size: uvec2,
-    }
-
-    /// Push constants of `auto_spread.comp`.
-    struct AutoSpreadPush {
+    /// Push constants of `noise_estimate.comp` and `auto_spread.comp`.
+    struct SurfacesPush {
         /// Image in pixels.
         size: uvec2,
         /// As in [`AtrousPush`]; that of radiance is 0.

@@ -5,7 +5,7 @@ use super::pack::{Pack, Packed};
 use super::{FilterInput, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{SvgfPush, vec3, vec4};
+use crate::layout::{SurfacesPush, vec3, vec4};
 use crate::math::srgb::luminance;
 use crate::shaders::noise_estimate::{self, Bind, Constants, MANY, PRIOR};
 pub use crate::shaders::shared::luminance::ENOUGH;
@@ -49,7 +49,7 @@ impl Estimate {
     /// colour\[P\], place\[P\], variance\[P\] -> plane\[P\]
     pub fn record(&self, rec: &mut Recorder, planes: &Planes, pack: &Pack) -> Result<()> {
         let rates = self.rates.as_array();
-        let push = SvgfPush { size: planes.size, spacing: 1, rate_l: 0.0, rates, ..Default::default() };
+        let push = SurfacesPush { size: planes.size, rates, ..Default::default() };
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
         let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
         let kernel = &self.kernels[usize::from(planes.variance.is_some())];

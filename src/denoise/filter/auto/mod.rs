@@ -16,7 +16,7 @@ use super::svgf::Levels;
 use super::{Filter, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{AutoBlendPush, AutoErrorPush, AutoLeveragePush, AutoPush, AutoResidualPush, vec2, vec3, vec4};
+use crate::layout::{AutoPush, vec2, vec3, vec4};
 use crate::shaders::shared::own_variance;
 use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual};
 use crate::threads::{both, each};
@@ -171,15 +171,26 @@ impl Auto {
         })
     }
 
+    /// For an image of this size.
+    fn push(&self, size: [u32; 2]) -> AutoPush {
+        AutoPush {
+            size,
+            floor: floor(&self.settings),
+            rates: Rates::of_surfaces(&self.settings.edge).as_array(),
+            shares: shares(&self.settings),
+            ..Default::default()
+        }
+    }
+
     /// What every candidate makes of the image, and how much of it each keeps.
     fn record_candidates(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let ([wide, middle, narrow], size, count) = (&self.windows, planes.size, planes.pixels());
+        let push = self.push(size);
         let [of_wide, of_middle, of_narrow, of_svgf] = &self.results;
         let Packed { colour, channels, .. } = &self.windows_pack;
         let (estimate, probe) = (&self.svgf_estimate.plane, &self.planes[0]);
         self.windows_pack.record(rec, planes)?;
         wide.record(rec, size, [colour, channels], of_wide)?;
-        let push = AutoPush { size, floor: floor(&self.settings), ..Default::default() };
         self.svgf_estimate.record(rec, planes, &self.pack)?;
         let bind =
             auto_inputs::Bind { colour: &self.pack.colour, wide: of_wide, estimate, dim: &self.dim, probed: probe };
@@ -197,13 +208,6 @@ impl Auto {
             place: &self.pack.place,
             estimate: &self.estimate.plane,
             leverages: &self.leverages,
-        };
-        let push = AutoLeveragePush {
-            count,
-            floor: floor(&self.settings),
-            size: planes.size,
-            rates: Rates::of_surfaces(&self.settings.edge).as_array(),
-            ..Default::default()
         };
         rec.dispatch_threads(&self.leverage, bind, &push, count)
     }
@@ -225,10 +229,7 @@ impl Auto {
             products,
             others,
         };
-        let count = planes.pixels();
-        let (size, shares) = (planes.size, shares(&self.settings));
-        let push = AutoErrorPush { count, floor: floor(&self.settings), size, shares, ..Default::default() };
-        rec.dispatch_threads(&self.error, bind, &push, count)
+        rec.dispatch_threads(&self.error, bind, &self.push(planes.size), planes.pixels())
     }
 
     /// The blend lies where what it is made by has come from.
@@ -246,10 +247,7 @@ impl Auto {
             blend: self.blended(),
             filtered: &planes.output,
         };
-        let rates = Rates::of_surfaces(&self.settings.edge).as_array();
-        let (size, floor) = (planes.size, floor(&self.settings));
-        let push = AutoResidualPush { size, floor, rates, ..Default::default() };
-        rec.dispatch(&self.residual, bind, &push, self.residual.groups(threads(planes.size, 1)))
+        rec.dispatch(&self.residual, bind, &self.push(planes.size), self.residual.groups(threads(planes.size, 1)))
     }
 }
 
@@ -283,10 +281,8 @@ impl Filter for Auto {
             blend: self.blended(),
             expected: &self.expected,
         };
-        let count = planes.pixels();
         let blend = &self.blend[usize::from(planes.variance.is_some())];
-        let push = AutoBlendPush { count, shares: shares(&self.settings), ..Default::default() };
-        rec.dispatch_threads(blend, bind, &push, count)?;
+        rec.dispatch_threads(blend, bind, &self.push(planes.size), planes.pixels())?;
         self.record_residual(rec, planes)
     }
 

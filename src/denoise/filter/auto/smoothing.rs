@@ -6,7 +6,7 @@ use crate::denoise::filter::edge::{EdgeSettings, Rates, edge_weight};
 use crate::denoise::filter::pack::{Pack, Packed};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{AutoCellsPush, AutoSmoothPush, AutoSpreadPush, uvec4, vec3, vec4};
+use crate::layout::{AutoSmoothPush, SizePush, SurfacesPush, uvec4, vec3, vec4};
 use crate::shaders::auto_spread::{OTHER, UNKNOWN};
 use crate::shaders::shared::smoothing_cell::SMOOTHING_CELL;
 use crate::shaders::{auto_cells, auto_smooth, auto_spread};
@@ -75,7 +75,7 @@ impl Smoothing {
     /// colour\[P\], place\[P\] -> the surfaces of cells, for all that follows
     pub fn record_cells(&self, rec: &mut Recorder, pack: &Pack, size: [u32; 2]) -> Result<()> {
         let bind = auto_cells::Bind { colour: &pack.colour, place: &pack.place, cells: &self.surfaces };
-        rec.dispatch(&self.cells, bind, &AutoCellsPush { size, ..Default::default() }, self.cells.groups(grid(size)))
+        rec.dispatch(&self.cells, bind, &SizePush { size, ..Default::default() }, self.cells.groups(grid(size)))
     }
 
     /// from\[P\] -> to\[P\]; `between` holds every other level, and may be `from`. `across` surfaces, three planes; or within alike
@@ -116,7 +116,7 @@ impl Smoothing {
         let ([first, second, third], [first_spread, second_spread, third_spread]) = (between, to);
         let bind =
             auto_spread::Bind { colour, place, cells, first, second, third, first_spread, second_spread, third_spread };
-        rec.dispatch(spread, bind, &AutoSpreadPush { size, rates, ..Default::default() }, spread.groups(size))
+        rec.dispatch(spread, bind, &SurfacesPush { size, rates, ..Default::default() }, spread.groups(size))
     }
 }
 
