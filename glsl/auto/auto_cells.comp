@@ -3,8 +3,7 @@
 
 // Finds the surface that each cell stands for, one per thread.
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
 layout(scalar, binding = 2) writeonly buffer Cells { uvec4 cells[]; };
 layout(scalar, push_constant) uniform Push { SizePush push; };
 

@@ -10,18 +10,15 @@
 // Samples that are stratified over lamps have far less noise than their variance tells. Neighbours tell it as well: by their second
 // differences (Gasser, Sroka, Jennen-Steinmetz 1986), which light that changes linearly does not enter.
 layout(local_size_x = 64) in;
-layout(binding = 0) uniform samplerBuffer wide; // of vec4, of the image
-layout(binding = 1) uniform samplerBuffer svgf; // of vec4, of the image
-layout(binding = 2) uniform samplerBuffer narrow; // of float, leverages
-layout(binding = 3) uniform samplerBuffer probed; // of vec4, what svgf makes of the probed image
-layout(binding = 4) uniform samplerBuffer colour; // of vec4
-layout(binding = 5) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
+layout(binding = 2) uniform samplerBuffer wide; // of vec4, of the image
+layout(binding = 3) uniform samplerBuffer svgf; // of vec4, of the image
+layout(binding = 4) uniform samplerBuffer narrow; // of float, leverages
+layout(binding = 5) uniform samplerBuffer probed; // of vec4, what svgf makes of the probed image
 layout(binding = 6) uniform samplerBuffer estimate; // of vec4
 // Squared second differences, what variances tell of them, leverages in the narrow window and in svgf.
 layout(scalar, binding = 7) writeonly buffer Output { vec4 leverages[]; };
 layout(scalar, push_constant) uniform Push { AutoPush push; };
-
-#include "shared/packed_pixels.glsl"
 
 const float LIMIT = 1e9; // as in auto_error.comp
 

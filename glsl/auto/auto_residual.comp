@@ -7,15 +7,12 @@
 // rest of the difference is added (twicing: Tukey 1977; soft threshold: Donoho 1995). Windows of like pixels, of 7x7, 3x3 and one
 // pixel, follow each other. A blend that fits the pixels stays as it is. A thread takes ROWS pixels of a column.
 layout(local_size_x_id = 100) in;
-layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
 layout(binding = 2) uniform samplerBuffer estimate; // of vec4
 layout(binding = 3) uniform samplerBuffer others; // of vec4
 layout(binding = 4) uniform samplerBuffer blend; // of vec4, of auto.comp
 layout(scalar, binding = 5) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { AutoPush push; };
-
-#include "shared/packed_pixels.glsl"
 
 const int REACH = 3; // pixels from the centre to the border of the largest window
 const float SIGNIFICANT = 3.0; // standard deviations that noise explains

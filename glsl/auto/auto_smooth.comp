@@ -6,8 +6,7 @@
 // count by their edge weights, others at least by `push.least`; cells without a known pixel have no estimate. The first level
 // makes cells of pixels. A thread smooths ROWS cells of a column.
 layout(local_size_x_id = 100) in;
-layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
 layout(binding = 2) uniform usamplerBuffer cells; // of uvec4, of auto_cells.comp
 layout(binding = 3) uniform samplerBuffer first; // of vec4
 layout(binding = 4) uniform samplerBuffer second; // of vec4
@@ -16,8 +15,6 @@ layout(scalar, binding = 6) writeonly buffer First { vec4 first_smoothed[]; };
 layout(scalar, binding = 7) writeonly buffer Second { vec4 second_smoothed[]; };
 layout(scalar, binding = 8) writeonly buffer Third { vec4 third_smoothed[]; };
 layout(scalar, push_constant) uniform Push { AutoSmoothPush push; };
-
-#include "shared/packed_pixels.glsl"
 
 layout(constant_id = 114) const bool THREE = true; // false: the first plane alone
 layout(constant_id = 115) const bool OF_PIXELS = false; // the first level

@@ -4,8 +4,7 @@
 // Gives every pixel the smoothed estimates of the four cells around it: between their first pixels linearly, those of like
 // surfaces first. One pixel per thread.
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
 layout(binding = 2) uniform usamplerBuffer cells; // of uvec4
 layout(binding = 3) uniform samplerBuffer first; // of vec4, of cells
 layout(binding = 4) uniform samplerBuffer second; // of vec4
@@ -14,8 +13,6 @@ layout(scalar, binding = 6) writeonly buffer First { vec4 first_spread[]; };
 layout(scalar, binding = 7) writeonly buffer Second { vec4 second_spread[]; };
 layout(scalar, binding = 8) writeonly buffer Third { vec4 third_spread[]; };
 layout(scalar, push_constant) uniform Push { SurfacesPush push; };
-
-#include "shared/packed_pixels.glsl"
 
 layout(constant_id = 114) const bool THREE = true; // false: the first plane alone
 // Least weights of cells of another surface, and of those without a known pixel.

@@ -5,12 +5,9 @@
 // that are push.spacing pixels apart, each weighted by how alike the two pixels are and by its number of samples. A thread
 // filters ROWS pixels of a column.
 layout(local_size_x_id = 100) in;
-layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { AtrousPush push; };
-
-#include "shared/packed_pixels.glsl"
 
 layout(constant_id = 114) const bool CONSERVE = false; // weight that a neighbour lacks goes to the centre
 

@@ -3,13 +3,11 @@
 // Filters radiance by the bilateral filter (Tomasi and Manduchi 1998), evaluated over the whole window; it is a joint one
 // where normals or positions have weights. A thread filters ROWS pixels of a column, which share nearly all their taps.
 layout(local_size_x_id = 100) in;
-layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, binding = 3) buffer Sums { vec4 sums[]; };
 layout(scalar, push_constant) uniform Push { BilateralPush push; };
 
-#include "shared/packed_pixels.glsl"
 // Whether the window is cut into bands of rows, with one dispatch per band that adds to `sums` (weighted differences,
 // weights): see shared/loop_limit.glsl.
 layout(constant_id = 115) const bool BANDS = false;

@@ -6,13 +6,11 @@
 // their own variance: below ENOUGH samples it is the variance over like pixels of a 7x7 window (Schied et al. 2017, section 4.2). For
 // CAUTIOUS readers, below MANY samples, what those pixels' samples tell counts too. A thread takes ROWS pixels of a column.
 layout(local_size_x_id = 100) in;
-layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
 layout(binding = 2) uniform samplerBuffer variance; // of vec3
 layout(scalar, binding = 3) writeonly buffer Estimates { vec4 estimate[]; };
 layout(scalar, push_constant) uniform Push { SurfacesPush push; };
 
-#include "shared/packed_pixels.glsl"
 #include "shared/own_variance.glsl"
 
 layout(constant_id = 115) const bool CAUTIOUS = true;

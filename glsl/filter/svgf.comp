@@ -7,10 +7,9 @@
 // ROWS pixels of a column. With TWO it filters a second image of the same surfaces beside the first: what both share of the weights
 // is most of the work.
 layout(local_size_x_id = 100) in;
-layout(binding = 0) uniform samplerBuffer estimate; // of vec4
-layout(binding = 1) uniform samplerBuffer second; // of vec4
-layout(binding = 2) uniform usamplerBuffer place; // of uvec4
-layout(binding = 3) uniform samplerBuffer colour; // of vec4
+#include "shared/packed_pixels.glsl"
+layout(binding = 2) uniform samplerBuffer estimate; // of vec4
+layout(binding = 3) uniform samplerBuffer second; // of vec4
 layout(scalar, binding = 4) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, binding = 5) writeonly buffer Second { vec4 second_filtered[]; };
 layout(scalar, push_constant) uniform Push { SvgfPush push; };

@@ -5,12 +5,9 @@
 // prediction errors. It is CDF(2,2) along rows and columns, or red-black (Uytterhoeven and Bultheel 1998) on the quincunx;
 // with edge weights these are Fattal's (2009). Sums are of differences from the pixel, so that a constant image stays exact.
 layout(local_size_x_id = 100) in;
-layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+#include "shared/packed_pixels.glsl"
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { WaveletPush push; };
-
-#include "shared/packed_pixels.glsl"
 
 layout(constant_id = 114) const bool INVERSE = false;
 

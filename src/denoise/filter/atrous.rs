@@ -9,6 +9,7 @@ use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{AtrousPush, vec4};
 use crate::settings::{choices, settings};
 use crate::shaders::atrous::{Bind, Constants, MOST_SAMPLES};
+use crate::shaders::shared::packed_pixels;
 use glam::Vec3;
 
 /// See [`super::FILTERS`].
@@ -104,7 +105,7 @@ impl Filter for Atrous {
             let spacing = 1 << level;
             let push = AtrousPush { size: planes.size, spacing, rates: rates.as_array(), ..Default::default() };
             let kernel = &self.kernels[usize::from(level >= self.rt_from_level as usize)];
-            let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
+            let bind = Bind { packed_pixels: packed_pixels::Bind { colour: from, ..self.pack.bind() }, filtered: to };
             rec.dispatch(kernel, bind, &push, kernel.groups(threads(planes.size, spacing)))?;
             from = to;
         }

@@ -73,9 +73,8 @@ impl Filter for Bilateral {
             band_rows,
             ..Default::default()
         };
-        let (colour, place) = (&self.pack.colour, &self.pack.place);
         (0..bands).try_for_each(|band| {
-            let bind = Bind { colour, place, filtered: &planes.output, sums: &self.sums };
+            let bind = Bind { packed_pixels: self.pack.bind(), filtered: &planes.output, sums: &self.sums };
             let groups = self.kernel.groups([width, height.div_ceil(ROWS)]);
             rec.dispatch(&self.kernel, bind, &BilateralPush { band, ..push }, groups)
         })

@@ -51,7 +51,7 @@ impl Estimate {
         let rates = self.rates.as_array();
         let push = SurfacesPush { size: planes.size, rates, ..Default::default() };
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
-        let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
+        let bind = Bind { packed_pixels: pack.bind(), variance, estimate: &self.plane };
         let kernel = &self.kernels[usize::from(planes.variance.is_some())];
         rec.dispatch(kernel, bind, &push, kernel.groups(threads(planes.size, 1)))
     }

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{PackPush, uvec4, vec4};
 use crate::shaders::pack::Bind;
+use crate::shaders::shared::packed_pixels;
 use glam::Vec3;
 
 /// Of a pixel of both planes.
@@ -31,6 +32,11 @@ impl Pack {
             colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
             place: Buffer::new(gpu, "place", pixels, Location::Device)?,
         })
+    }
+
+    /// What the filters bind.
+    pub fn bind(&self) -> packed_pixels::Bind<'_> {
+        packed_pixels::Bind { colour: &self.colour, place: &self.place }
     }
 
     /// radiance\[P\], guide\[P\] -> colour\[P\], place\[P\]

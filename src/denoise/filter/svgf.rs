@@ -110,8 +110,7 @@ impl Levels {
             let bind = Bind {
                 estimate: from[0],
                 second: from[1],
-                place: &pack.place,
-                colour: &pack.colour,
+                packed_pixels: pack.bind(),
                 filtered: to[0],
                 second_filtered: to[1],
             };

@@ -15,6 +15,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{WaveletPush, vec4};
 use crate::settings::{choices, settings};
+use crate::shaders::shared::packed_pixels;
 use crate::shaders::wavelet::{Bind, Constants};
 use crate::threads::each;
 use glam::Vec3;
@@ -111,7 +112,7 @@ impl Filter for Wavelet {
             };
             let rates = self.rates.as_array();
             let push = WaveletPush { size: planes.size, spacing, stencil, rates, ..Default::default() };
-            let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
+            let bind = Bind { packed_pixels: packed_pixels::Bind { colour: from, ..self.pack.bind() }, filtered: to };
             let kernel = &self.kernels[usize::from(inverse)];
             rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))?;
             from = to;

@@ -204,8 +204,7 @@ impl Auto {
             svgf: of_svgf,
             narrow: &narrow.leverages,
             probed: &self.svgf_probed,
-            colour: &self.pack.colour,
-            place: &self.pack.place,
+            packed_pixels: self.pack.bind(),
             estimate: &self.estimate.plane,
             leverages: &self.leverages,
         };
@@ -240,8 +239,7 @@ impl Auto {
     /// The blend, and what it has lost -> output\[P\]
     fn record_residual(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let bind = auto_residual::Bind {
-            colour: &self.pack.colour,
-            place: &self.pack.place,
+            packed_pixels: self.pack.bind(),
             estimate: &self.estimate.plane,
             others: &self.smoothed[2],
             blend: self.blended(),

@@ -74,7 +74,7 @@ impl Smoothing {
 
     /// colour\[P\], place\[P\] -> the surfaces of cells, for all that follows
     pub fn record_cells(&self, rec: &mut Recorder, pack: &Pack, size: [u32; 2]) -> Result<()> {
-        let bind = auto_cells::Bind { colour: &pack.colour, place: &pack.place, cells: &self.surfaces };
+        let bind = auto_cells::Bind { packed_pixels: pack.bind(), cells: &self.surfaces };
         rec.dispatch(&self.cells, bind, &SizePush { size, ..Default::default() }, self.cells.groups(grid(size)))
     }
 
@@ -89,7 +89,7 @@ impl Smoothing {
         across: bool,
     ) -> Result<()> {
         let (Kernels { smooth, spread }, rates) = (&self.kernels[usize::from(across)], self.rates);
-        let (Pack { colour, place, .. }, cells) = (pack, &self.surfaces);
+        let (packed_pixels, cells) = (pack.bind(), &self.surfaces);
         for level in 0..LEVELS {
             let ([first, second, third], [first_smoothed, second_smoothed, third_smoothed]) = match level {
                 0 => (from, to),
@@ -97,8 +97,7 @@ impl Smoothing {
                 _ => (to, between),
             };
             let bind = auto_smooth::Bind {
-                colour,
-                place,
+                packed_pixels,
                 cells,
                 first,
                 second,
@@ -115,7 +114,7 @@ impl Smoothing {
         }
         let ([first, second, third], [first_spread, second_spread, third_spread]) = (between, to);
         let bind =
-            auto_spread::Bind { colour, place, cells, first, second, third, first_spread, second_spread, third_spread };
+            auto_spread::Bind { packed_pixels, cells, first, second, third, first_spread, second_spread, third_spread };
         rec.dispatch(spread, bind, &SurfacesPush { size, rates, ..Default::default() }, spread.groups(size))
     }
 }
