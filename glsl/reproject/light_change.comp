@@ -1,4 +1,5 @@
 #include "shared/thread.glsl"
+#include "shared/largest_channel.glsl"
 
 // Sums what the probes of 3x3 cells have found, `spacing` cells apart, and keeps the largest change so far, as a share of the
 // light. Level after level, with a spacing of 1, 3, 9, the windows grow to 27x27 cells. Small ones find a strong change where it
@@ -31,7 +32,7 @@ void main() {
     }
     vec3 sum = abs(all.sum);
     float together = sqrt(max(all.size * all.size - all.squares, 0.0));
-    float change = push.spacing == LEAST_SPACING ? together : max(sum.r, max(sum.g, sum.b));
+    float change = push.spacing == LEAST_SPACING ? together : largest_channel(sum);
     all.change = max(LightChange_change(found, i), change > 0.0 ? change / all.light : 0.0);
     sums[i] = all;
 }

@@ -3,6 +3,7 @@
 #include "shared/scene.glsl"
 #include "shared/frame.glsl"
 #include "shared/finite.glsl"
+#include "shared/largest_channel.glsl"
 
 // Traces one path per cell of the film twice, with the same random numbers: before the scene changes, and after it. A path starts
 // at the point that a pixel's samples are of, which moves with its surface, and is seen from where the last frame's camera was. It
@@ -58,16 +59,14 @@ vec3 light_from(SurfacePoint at, uint index) {
     return light.direct + light.indirect;
 }
 
-float brightest(vec3 light) { return max(light.r, max(light.g, light.b)); }
-
 // What a path has found, in units of the light around its pixel: beside bright parts of the film, dark ones tell of a change as well. Its
 // own light is a tenth of the unit, so that no path counts for more than ten.
 LightChange share_of_light(vec3 difference, float light, uint pixel) {
-    float unit = max(0.9 * brightest(light_around(pixel, push.constants.size)) + 0.1 * light, 1e-30);
+    float unit = max(0.9 * largest_channel(light_around(pixel, push.constants.size)) + 0.1 * light, 1e-30);
     vec3 sum = difference / unit;
     LightChange change = LightChange_zero();
     change.sum = sum;
-    change.size = brightest(abs(sum));
+    change.size = largest_channel(abs(sum));
     change.squares = change.size * change.size;
     change.light = light / unit;
     change.count = 1u;
@@ -95,5 +94,5 @@ void main() {
     }
     vec3 difference = light - before.light;
     bool counts = pixel != NONE && finite(difference);
-    changes[i] = counts ? share_of_light(difference, brightest(max(light, before.light)), known) : LightChange_zero();
+    changes[i] = counts ? share_of_light(difference, largest_channel(max(light, before.light)), known) : LightChange_zero();
 }

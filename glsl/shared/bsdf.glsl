@@ -35,8 +35,6 @@ struct BsdfSample {
     bool delta;
 };
 
-const float GRAZING = 1e-9; // directions whose cosine is not above this count as below the horizon
-const vec3 UP = vec3(0.0, 0.0, 1.0);
 
 // With one kind of material in the scene, the compiler removes the test for it.
 const bool ONE_KIND = uint(FX_DIFFUSE) + uint(FX_CONDUCTOR) + uint(FX_DIELECTRIC) + uint(FX_COATED) + uint(FX_METALLIC) == 1u;
@@ -46,7 +44,7 @@ bool is_kind(bool effect, Bsdf b, uint kind) {
 }
 
 bool is_smooth(Bsdf b) {
-    return FX_SMOOTH && (!FX_ROUGH || b.alpha < SMOOTH_ALPHA);
+    return smooth_alpha(b.alpha);
 }
 
 // Microfacets whose roughness depends on the direction are those of roughness alpha, drawn out along y: Heitz 2014,
@@ -65,16 +63,6 @@ float facet_density(Bsdf b, vec3 m) {
 vec3 facet_sample(Bsdf b, vec3 w, vec2 u) {
     vec3 m = microfacet_sample(b.ggx, undrawn(b, w), b.alpha, u);
     return FX_ANISOTROPIC && b.stretch != 1.0 ? normalize(undrawn(b, m)) : m;
-}
-
-// Unit vector along a + b; finite where that is 0.
-vec3 half_vector(vec3 a, vec3 b) {
-    vec3 h = a + b;
-    return h * inversesqrt(max(dot(h, h), 1e-30));
-}
-
-vec3 mirror(vec3 w, vec3 m) {
-    return 2.0 * dot(w, m) * m - w;
 }
 
 float mean3(vec3 v) {

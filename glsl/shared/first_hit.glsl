@@ -1,5 +1,6 @@
 // What a camera ray meets and shows.
 #include "shared/camera.glsl"
+#include "shared/largest_channel.glsl"
 #include "shared/trace.glsl"
 #include "shared/surface.glsl"
 
@@ -39,7 +40,7 @@ bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
     sight.way.direction = view.basis * next.wi;
     sight.way.origin = ray_origin(s, sight.way.direction);
     sight.throughput *= next.weight * light_share(s, view.facing, sight.way.direction, next.wi.z);
-    return goes_on && max(sight.throughput.r, max(sight.throughput.g, sight.throughput.b)) > 0.0;
+    return goes_on && largest_channel(sight.throughput) > 0.0;
 }
 
 // The first surface that `ray` shows, behind smooth ones, or the sky. Depth and position are as if the way had been straight, so

@@ -2,6 +2,7 @@
 // of a metal and of a dielectric above a base, which is diffuse or lets light through. Local frame and conventions: see bsdf.glsl.
 // Fresnel reflectances are Schlick's, F(c) = f0 + (f90 - f0) (1 - c)^5 at the cosine c; microfacets are GGX.
 // Needs the binding `texels`, which holds the table of what they reflect.
+#include "shared/largest_channel.glsl"
 #include "shared/warp.glsl"
 #include "shared/microfacet.glsl"
 #include "shared/coat_table.glsl"
@@ -42,10 +43,6 @@ float refracted(Metallic b, float c) {
 // Cosine at which the clear coat sees a direction.
 float coat_cosine(Metallic b, vec3 w) {
     return FX_COAT_NORMALS ? dot(w, b.coat_normal) : w.z;
-}
-
-bool smooth_alpha(float alpha) {
-    return FX_SMOOTH && (!FX_ROUGH || alpha < SMOOTH_ALPHA);
 }
 
 vec2 microfacet_entry(uint table, float alpha, float column) {
@@ -89,11 +86,11 @@ Metallic metallic_layers(vec3 base, float metallic, vec3 f0, float f90, float tr
     f0 = min(f0, 1.0) * f90;
     b.f0 = mix(f0, base, metallic);
     b.f90 = mix(f90, 1.0, metallic);
-    b.dielectric = vec2(max(f0.r, max(f0.g, f0.b)), f90);
+    b.dielectric = vec2(largest_channel(f0), f90);
     b.alpha = alpha;
     b.coat = coat;
     b.coat_alpha = coat_alpha;
-    b.coat_normal = vec3(0.0, 0.0, 1.0);
+    b.coat_normal = UP;
     b.table = table;
     b.reflected = vec2(0.0);
     b.mean_let_in = 1.0;
@@ -121,8 +118,7 @@ vec4 metallic_odds(Metallic b, vec3 wo) {
 
 // Reflection by GGX microfacets without Fresnel factor: x = f cos, y = density per solid angle, z = cosine at the microfacet.
 vec3 metallic_lobe(vec3 wo, vec3 wi, float alpha) {
-    vec3 h = wo + wi;
-    vec3 m = h * inversesqrt(max(dot(h, h), 1e-30));
+    vec3 m = half_vector(wo, wi);
     float area = microfacet_area(true, wo, alpha);
     float density = microfacet_d(true, m, alpha) / (4.0 * area);
     float g = microfacet_g1(true, wo, alpha) * microfacet_g1(true, wi, alpha);
@@ -157,7 +153,7 @@ vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
         mat3 frame = basis_from_normal(b.coat_normal);
         wo = wo * frame; // row vector times matrix: into the frame
         wi = wi * frame;
-        if (min(wo.z, wi.z) <= 1e-9) return value;
+        if (min(wo.z, wi.z) <= GRAZING) return value;
     }
     vec3 lobe = metallic_lobe(wo, wi, b.coat_alpha);
     return value + vec4(vec3(b.coat * mix(COAT_F0, 1.0, schlick_weight(lobe.z)) * lobe.x), odds.x * lobe.y);
@@ -176,19 +172,19 @@ bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out
     if (!(coat || through || specular)) return true;
     float alpha = coat ? b.coat_alpha : b.alpha;
     delta = smooth_alpha(alpha);
-    vec3 m = vec3(0.0, 0.0, 1.0), seen = wo;
+    vec3 m = UP, seen = wo;
     mat3 frame = mat3(1.0);
     if (FX_COAT_NORMALS && coat) {
         frame = basis_from_normal(b.coat_normal);
         seen = wo * frame;
     }
     if (!delta) m = microfacet_sample(true, seen, alpha, u);
-    wi = 2.0 * dot(seen, m) * m - seen;
-    bool above = wi.z > 1e-9;
+    wi = mirror(seen, m);
+    bool above = wi.z > GRAZING;
     float inner = has_coat(b) ? coat_lets_in(b, coat_cosine(b, wo)) : 1.0, outer = inner;
     if (FX_COAT_NORMALS) {
         wi = frame * wi;
-        above = above && wi.z > 1e-9;
+        above = above && wi.z > GRAZING;
         if (has_coat(b)) outer = coat_lets_in(b, coat_cosine(b, wi));
     }
     if (coat) weight = vec3((1.0 - inner) / odds.x);

@@ -2,6 +2,23 @@
 // Needs effects.glsl.
 #include "shared/warp.glsl"
 
+const float GRAZING = 1e-9; // directions whose cosine is not above this count as below the horizon
+const vec3 UP = vec3(0.0, 0.0, 1.0);
+
+bool smooth_alpha(float alpha) {
+    return FX_SMOOTH && (!FX_ROUGH || alpha < SMOOTH_ALPHA);
+}
+
+// Unit vector along a + b; finite where that is 0.
+vec3 half_vector(vec3 a, vec3 b) {
+    vec3 h = a + b;
+    return h * inversesqrt(max(dot(h, h), 1e-30));
+}
+
+vec3 mirror(vec3 w, vec3 m) {
+    return 2.0 * dot(w, m) * m - w;
+}
+
 const float INV_SQRT_PI = 0.564189583547756;
 
 // With one distribution in the scene, the compiler removes the other.

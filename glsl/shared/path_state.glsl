@@ -1,4 +1,5 @@
 // What a path takes from one surface to the next, and what light it has found. Needs `push` (PathPush).
+#include "shared/largest_channel.glsl"
 #include "shared/pcg.glsl"
 #include "shared/segment.glsl"
 
@@ -35,7 +36,7 @@ uint kind_of_light(uint scattered, bool sharp, bool chosen) {
 
 // Clamps the largest channel of a whole sample, not of each bounce: the limit is that of the values which a pixel averages.
 vec3 clamped(vec3 light) {
-    float largest = max(light.r, max(light.g, light.b));
+    float largest = largest_channel(light);
     return light * (push.constants.clamp_indirect > 0.0 && largest > push.constants.clamp_indirect ? push.constants.clamp_indirect / largest : 1.0);
 }
 

@@ -1,5 +1,6 @@
 // A path's way from one surface to the next: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
 // Needs `push` (PathPush).
+#include "shared/largest_channel.glsl"
 #include "shared/sampler.glsl"
 #include "shared/surface.glsl"
 #include "shared/light.glsl"
@@ -69,13 +70,13 @@ bool scatter(inout Path path, Surface s, Bsdf bsdf, View view, Sampler random, u
         float eta = relative_index(bsdf, view.wo.z);
         path.eta_scale *= eta * eta;
     }
-    return scattered && max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
+    return scattered && largest_channel(path.throughput) > 0.0;
 }
 
 // Russian roulette. The survival probability leaves out the factors 1 / eta^2 that refraction scales radiance by, since they
 // cancel when the path leaves the glass.
 bool survives_roulette(inout Path path, Sampler random, uint pair) {
-    float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)) * path.eta_scale, MAX_SURVIVAL);
+    float q = min(largest_channel(path.throughput) * path.eta_scale, MAX_SURVIVAL);
     if (sample_2d(random, pair + PAIR_ROULETTE).x >= q) return false;
     path.throughput /= q;
     return true;
@@ -107,7 +108,7 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     }
     uint seed = shadow_mask_seed(p.seed, p.bounce);
     d.sampled = p.path.throughput * light_from_nee(s, bsdf, view, random, pair, seed, d.shadow, d.sharp);
-    d.shadowed = going && push.constants.light_count > 0u && !smooth_here && max(d.sampled.r, max(d.sampled.g, d.sampled.b)) > 0.0;
+    d.shadowed = going && push.constants.light_count > 0u && !smooth_here && largest_channel(d.sampled) > 0.0;
     d.alive = scatter(p.path, s, bsdf, view, random, pair) && going;
     p.scattered += smooth_here ? 0u : 1u;
     // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for what is sharp there.

@@ -1,6 +1,7 @@
 // Bilinear lookups of textures, which share one texel buffer since lavapipe has no descriptor indexing; a GPU's texture units go
 // unused. There are no mip levels: a pixel's samples average a texture without the bias of a blur, and levels would cost a third
 // more memory.
+#include "shared/largest_channel.glsl"
 #include "shared/pcg.glsl"
 #include "shared/scene.glsl"
 #include "shared/segment.glsl"
@@ -93,7 +94,7 @@ vec3 clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycen
     float through = textured_at(vec3(m.transmission_factor), m.transmission_texture, triangle, barycentric, false).r;
     float f90 = textured_at(vec3(m.specular_factor), m.specular_factor_texture, triangle, barycentric, false).r;
     vec3 specular = textured_at(m.specular, m.specular_texture, triangle, barycentric, true);
-    float f0 = min(max(specular.r, max(specular.g, specular.b)), 1.0) * f90;
+    float f0 = min(largest_channel(specular), 1.0) * f90;
     return base * (through * (1.0 - metallic) * (1.0 - mix(f0, f90, squared * squared * grazing)));
 }
 

@@ -55,7 +55,7 @@ pub struct BsdfSample {
 }
 
 pub use crate::layout::SMOOTH_ALPHA;
-pub use crate::shaders::shared::bsdf::GRAZING;
+pub use crate::shaders::shared::microfacet::GRAZING;
 
 impl Bsdf {
     /// A material of constant colours with this roughness. `texels` are the scene's, which hold the tables of rough coats.

@@ -3,6 +3,7 @@ use crate::layout::SMOOTH_ALPHA;
 use crate::math::microfacet::{microfacet_area, microfacet_d, microfacet_g1, microfacet_sample};
 use crate::math::warp::{INV_PI, basis_from_normal, warp_cosine_hemisphere};
 use crate::shaders::shared::metallic::{COAT_F0, LEAST_ODDS};
+use crate::shaders::shared::microfacet::GRAZING;
 use crate::twins::coat::{microfacet_means, microfacet_shares};
 use glam::{Vec2, Vec3, Vec4, vec2, vec3, vec4};
 
@@ -188,7 +189,7 @@ impl Metallic {
         }
         let to_coat = basis_from_normal(self.coat_normal).transpose();
         let (wo, wi) = (to_coat * wo, to_coat * wi);
-        if wo.z.min(wi.z) <= 1e-9 {
+        if wo.z.min(wi.z) <= GRAZING {
             return value;
         }
         let lobe = lobe(wo, wi, self.coat_alpha);
@@ -211,7 +212,7 @@ impl Metallic {
         };
         let (wi, delta) = mirrored(wo, alpha, u);
         let weight = weight * (inner * self.coat_lets_in(wi.dot(self.coat_normal)));
-        let scattered = wi.z > 1e-9;
+        let scattered = wi.z > GRAZING;
         let wi = if beyond { vec3(wi.x, wi.y, -wi.z) } else { wi };
         LobeSample { wi, weight, delta, scattered }
     }
@@ -220,7 +221,7 @@ impl Metallic {
         let frame = basis_from_normal(self.coat_normal);
         let (own, delta) = mirrored(frame.transpose() * wo, self.coat_alpha, u);
         let wi = frame * own;
-        LobeSample { wi, weight: Vec3::splat(weight), delta, scattered: own.z.min(wi.z) > 1e-9 }
+        LobeSample { wi, weight: Vec3::splat(weight), delta, scattered: own.z.min(wi.z) > GRAZING }
     }
 
     /// Approximate reflectance at the cosine `c`.
