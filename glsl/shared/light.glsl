@@ -67,7 +67,8 @@ vec3 environment_lookup(vec2 uv) {
     vec2 at = uv * vec2(size) - 0.5;
     ivec2 p = ivec2(floor(at));
     vec2 f = at - vec2(p);
-    int x0 = p.x < 0 ? p.x + size.x : p.x >= size.x ? p.x - size.x : p.x;
+    // At the poles atan(0, 0) may be no number, from which any integer may come.
+    int x0 = clamp(p.x < 0 ? p.x + size.x : p.x >= size.x ? p.x - size.x : p.x, 0, size.x - 1);
     int x1 = x0 + 1 == size.x ? 0 : x0 + 1;
     int y0 = clamp(p.y, 0, size.y - 1) * size.x, y1 = clamp(p.y + 1, 0, size.y - 1) * size.x;
     vec3 top = mix(texelFetch(environment, y0 + x0).rgb, texelFetch(environment, y0 + x1).rgb, f.x);

@@ -20,9 +20,10 @@ bvec2 texture_keeps_border(Texture image) {
 
 vec4 texture_texel(Texture image, ivec2 at, bool colour) {
     ivec2 edge = ivec2(image.width, image.height);
-    // Coordinates lie at most one texel outside the image, so that adding or subtracting one period wraps them.
-    at = mix(at + mix(ivec2(0), edge, lessThan(at, ivec2(0))), clamp(at, ivec2(0), edge - 1), texture_keeps_border(image));
-    at = mix(at, at - edge, greaterThanEqual(at, edge));
+    // Coordinates lie at most one texel outside the image, so that adding or subtracting one period wraps them. What no number has become
+    // may lie anywhere.
+    ivec2 wrapped = at + mix(ivec2(0), edge, lessThan(at, ivec2(0))) - mix(ivec2(0), edge, greaterThanEqual(at, edge));
+    at = clamp(mix(wrapped, at, texture_keeps_border(image)), ivec2(0), edge - 1);
     uint word = texel_word(image.first + uint(at.y * edge.x + at.x));
     if (FX_HDR_TEXTURES && (image.flags & TEXTURE_FLOAT) != 0u) return vec4(uintBitsToFloat(word));
     if (FX_HDR_TEXTURES && (image.flags & TEXTURE_RGB9E5) != 0u) {
