@@ -47,14 +47,14 @@ void main() {
         }
         from = to;
     }
-    // Pixels of many paths have a loop of their own: a CPU that masks lanes runs all STRIDE stores for every pixel in it.
+    // Pixels of many paths have a loop of their own: a CPU that masks lanes runs all SAMPLES_A_TURN stores for every pixel in it.
     for (uint k = many; k < THREAD_ITEMS; k++) {
         uint i = first + k;
         if (i >= push.pixels) break;
         uvec2 run = paths_in_batch(offset_of(i), offset_of(i + 1u), begin, end);
         uint index = first_index(i) + PLAIN;
-        for (uint at = run.x + PLAIN; at < run.y; at += STRIDE, index += STRIDE) {
-            [[unroll]] for (uint j = 0u; j < STRIDE; j++) {
+        for (uint at = run.x + PLAIN; at < run.y; at += SAMPLES_A_TURN, index += SAMPLES_A_TURN) {
+            [[unroll]] for (uint j = 0u; j < SAMPLES_A_TURN; j++) {
                 if (at + j < run.y) paths[at + j] = packUint2x32(uvec2(i, index + j));
             }
         }

@@ -33,7 +33,7 @@ const uint ROUNDS = 4u;       // of exchanges between all pairs
 const float RIDGE = 0.01;     // share added to every squared error: candidates that hardly differ get like weights
 // A left-out pixel is missed by its noise at least, so that the best candidate bounds it from above, but for chance: no noise is less
 // than this share of what is told.
-const float LEAST = 0.05;
+const float LEAST_NOISE = 0.05;
 // From this number of samples on svgf takes part. With it, two samples left Crytek Sponza dark and grained: FLIP .203 in place of .163.
 const float ENOUGH_FOR_SVGF = 4.0;
 // What one sample has brought is cut to so many times what svgf finds. Such pixels are few among those whose noise their neighbours
@@ -77,7 +77,7 @@ void main() {
     bool usable[5] = bool[](enough, a.w > 0.0, b.w > 0.0, n.w > 0.0, c.w >= ENOUGH_FOR_SVGF && d.w > 0.0);
     // Mean products of the candidates' errors. An independent copy of the pixel misses it by the noise of both, and shares
     // the pixel's own noise with every filter's error.
-    float told = 0.5 * other.z, noise = max(min(told, min(min(square.x, square.y), min(square.z, square.w))), LEAST * told);
+    float told = 0.5 * other.z, noise = max(min(told, min(min(square.x, square.y), min(square.z, square.w))), LEAST_NOISE * told);
     float missed[5][5] = float[][](
         float[](2.0 * noise, noise, noise, noise, noise),
         float[](noise, square.x, product.x, product.y, product.z),

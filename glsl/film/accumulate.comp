@@ -64,7 +64,7 @@ void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits,
     mean = moved;
 }
 
-float square(float a, float b) {
+float cut_product(float a, float b) {
     return clamp(a, -MAX_DEVIATION, MAX_DEVIATION) * clamp(b, -MAX_DEVIATION, MAX_DEVIATION);
 }
 
@@ -98,8 +98,8 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
     if (!FX_MANY_SAMPLES || s.count <= MAX_ROUNDED_SAMPLES) s.mean += off * share;
     else move_mean(s.mean, off * share, s.remainder, 0, BITS, s.count);
     vec3 off_moved = radiance - s.mean;
-    [[unroll]] for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + square(off[c], off_moved[c]), MAX_M2);
-    if (FX_SPLIT) l.indirect_m2 = clamp(l.indirect_m2 + square(off_other, other - luminance(s.mean - l.direct)), 0.0, MAX_M2);
+    [[unroll]] for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + cut_product(off[c], off_moved[c]), MAX_M2);
+    if (FX_SPLIT) l.indirect_m2 = clamp(l.indirect_m2 + cut_product(off_other, other - luminance(s.mean - l.direct)), 0.0, MAX_M2);
 }
 
 // store_sample has found the lowest pixel with a broken sample; that pixel's thread alone writes which sample it was.
@@ -123,8 +123,8 @@ void main() {
     if (FX_SPLIT) l = PixelLight_load(light, pixel);
     uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // else at most SAMPLES_AT_ONCE (src/render/schedule/cut.rs)
     for (uint k = 0u; k < plain; k++) fold(s, l, broken_count, first_broken, int(at + k * step));
-    for (uint k = plain; FX_ADAPTIVE && k < count; k += STRIDE) {
-        [[unroll]] for (uint j = 0u; j < STRIDE; j++) {
+    for (uint k = plain; FX_ADAPTIVE && k < count; k += SAMPLES_A_TURN) {
+        [[unroll]] for (uint j = 0u; j < SAMPLES_A_TURN; j++) {
             if (k + j < count) fold(s, l, broken_count, first_broken, int(at + (k + j) * step));
         }
     }

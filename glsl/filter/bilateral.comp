@@ -53,7 +53,7 @@ void main() {
                 int j = y - first - k;
                 float along = abs(j) <= radius ? -push.rate_space * float(j * j) : REFUSED;
                 float exponent = edge_exponent(centre[k], q, push.rates) + (across + along);
-                float w = exponent > LEAST ? exp2(exponent) : 0.0;
+                float w = exponent > LEAST_EXPONENT ? exp2(exponent) : 0.0;
                 sum[k] += w * (q.colour.rgb - centre[k].colour.rgb);
                 total[k] += w;
             }

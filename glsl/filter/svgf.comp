@@ -17,6 +17,7 @@ layout(scalar, push_constant) uniform Push { SvgfPush push; };
 layout(constant_id = 114) const bool LAST = false;
 layout(constant_id = 115) const bool TWO = false;
 const int IMAGES = TWO ? 2 : 1;
+const float LEAST_DEVIATION = 1e-30; // stands for 0, so that equal pixels are alike where nothing varies
 
 int index(ivec2 at) {
     return at.y * int(push.size.x) + at.x;
@@ -67,8 +68,8 @@ void main() {
         [[unroll]] for (int m = 0; m < IMAGES; m++) {
             vec4 here = fetch(m, index(at));
             centre[m][k] = here;
-            // Stays finite without variance, so that equal pixels weigh 1. An unknown pixel has no luminance to compare.
-            rate[m][k] = here.w >= 0.0 ? push.rate_l / (deviation(m, at) + 1e-30) : 0.0;
+            // An unknown pixel has no luminance to compare.
+            rate[m][k] = here.w >= 0.0 ? push.rate_l / (deviation(m, at) + LEAST_DEVIATION) : 0.0;
             sum[m][k] = vec3(0.0);
             total[m][k] = 0.0;
             spread[m][k] = 0.0;

@@ -9,8 +9,8 @@ layout(binding = 0) uniform usamplerBuffer found; // of LightChange
 layout(scalar, binding = 1) writeonly buffer Sums { LightChange sums[]; };
 layout(scalar, push_constant) uniform Push { LightChangePush push; };
 
-// Paths that nothing has changed differ by nothing at all, so that every difference is one of light: the question is of how much. In
-// windows of 3x3 cells differences count by their size, since a narrow shadow that moves on takes as much light as it gives back. There a
+// Both paths of a probe have the same random numbers, so that they differ only where light has changed. In windows of 3x3 cells
+// differences count by their size, since a narrow shadow that moves on takes as much light as it gives back. There a
 // single path would stand for a ninth of the light: the squared sum loses what each path alone has. Among 81 and 729 paths one counts as
 // it is, with its sign: it stands for little, and noise cancels.
 const uint LEAST_SPACING = 1u;

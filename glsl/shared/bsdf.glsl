@@ -20,7 +20,7 @@ struct Bsdf {
     uint coat_table;
     bool nonlinear;
     bool ggx;
-    Metallic metallic; // of that kind, which has no other members
+    Metallic metallic; // all that BSDF_METALLIC is evaluated by
     // bsdf_view computes these once for a coat:
     float coat_row;     // of the table at this roughness
     float coat_outside; // the share of light from the viewer that the coat does not let in

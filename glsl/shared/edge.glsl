@@ -7,7 +7,7 @@ layout(constant_id = 111) const bool WEIGHT_N = true;
 layout(constant_id = 112) const bool WEIGHT_X = true;
 layout(constant_id = 113) const bool SQUARED = true; // false: the norms as equation 5 prints them
 
-const float LEAST = -50.0; // weights below 2^LEAST are 0, so that squares of the others do not underflow on any device
+const float LEAST_EXPONENT = -50.0; // weights below 2^LEAST_EXPONENT are 0, so that squares of the others do not underflow on any device
 
 struct Pixel {
     vec4 colour; // w: samples, 0 where the pixel is unknown
@@ -35,5 +35,5 @@ float edge_exponent(Pixel p, Pixel q, vec3 rates) {
 }
 
 float edge_weight(Pixel q, float exponent) {
-    return q.colour.w > 0.0 && exponent > LEAST ? exp2(exponent) : 0.0;
+    return q.colour.w > 0.0 && exponent > LEAST_EXPONENT ? exp2(exponent) : 0.0;
 }

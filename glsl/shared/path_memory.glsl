@@ -60,7 +60,7 @@ void save_path(uint i, PathState p, Departure d) {
     if (FX_SOFT) keep(SOFT_LIGHT, i, p.light.soft, 0u);
 }
 
-// The path, but for `sharp_only`; of how it departed, what it needs to know once its rays are traced.
+// All of the path but `sharp_only`. Of its departure it sets what is read once the rays are traced: the sampled light and the flags.
 PathState saved_path(uint i, out Departure d) {
     PathState p;
     uint pdf, scale, state, t;

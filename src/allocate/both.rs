@@ -2,7 +2,7 @@
 //! filter of indirect light will remove. Noise is estimated over similar neighbours, from the variance of their samples
 //! and from the differences between their means. Kernels: `glsl/allocate/likeness.comp`, `glsl/allocate/both.comp`.
 use super::geometry::Geometry;
-use super::variance::{moments, noise, square};
+use super::variance::{moments, noise, window};
 use super::{HostInputs, Inputs, Placing, Policy, PolicyPass, geometry};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
@@ -11,6 +11,7 @@ use crate::math::portable::{exp_negative, squared_distance};
 use crate::math::srgb::luminance;
 use crate::settings::settings;
 use crate::shaders::both::{MAX_DEVIATION, MAX_TINT, MIN_LEFT};
+use crate::shaders::likeness::ALBEDO_SCALE;
 use crate::shaders::shared::likeness_bits::{GATHERED_UNIT, MIN_KINSHIP, SEVENTHS};
 use crate::shaders::{both, likeness};
 use glam::Vec3;
@@ -79,7 +80,7 @@ impl PolicyPass for Both {
 /// How much the noise of a neighbour tells about that of a pixel, 0 to 1.
 fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
     let apart = |of: fn(&Guide) -> vec3| squared_distance(of(a), of(b));
-    let x = apart(|g| g.normal) * push.normal_scale + apart(|g| g.albedo) * 25.0;
+    let x = apart(|g| g.normal) * push.normal_scale + apart(|g| g.albedo) * ALBEDO_SCALE;
     let alike = (a.material == NONE) == (b.material == NONE);
     let sevenths = if alike { (exp_negative(x) * SEVENTHS + 0.5).floor() } else { 0.0 };
     (sevenths / SEVENTHS).max(MIN_KINSHIP)
@@ -101,7 +102,7 @@ fn surroundings(inputs: &HostInputs, pixel: usize) -> ([f32; 4], f32) {
     let mut around = [0.0; 4];
     let (mut offsets, mut kin_of_all) = (Vec3::ZERO, 0.0);
     let (mut squares, mut weights, mut freedom, mut indirect) = (0.0, 0.0, 0.0, 0.0);
-    for j in square(push, pixel).filter(|&j| stats[j].count > 0) {
+    for j in window(push, pixel).filter(|&j| stats[j].count > 0) {
         let (kin, m) = (kinship(&guide[pixel], &guide[j], push), moments(&stats[j]));
         let offset = Vec3::from(stats[j].mean) - Vec3::from(stats[pixel].mean);
         let offset = offset.clamp(Vec3::splat(-MAX_DEVIATION), Vec3::splat(MAX_DEVIATION));

@@ -7,6 +7,7 @@ use crate::layout::{Guide, NONE, PriorityPush};
 use crate::math::portable::{exp_negative, squared_distance};
 use crate::settings::{ABOVE_0, settings};
 use crate::shaders::geometry::Bind;
+use crate::shaders::shared::similarity::SIMILARITY_UNIT;
 use serde::Serialize;
 
 /// The entry of this policy in [`super::POLICIES`].
@@ -57,7 +58,7 @@ fn similarity(a: &Guide, b: &Guide, push: &PriorityPush) -> u32 {
     }
     let x = squared_distance(a.normal, b.normal) * push.normal_scale
         + squared_distance(a.position, b.position) * push.position_scale;
-    (exp_negative(x) * 65536.0 + 0.5) as u32
+    (exp_negative(x) * SIMILARITY_UNIT + 0.5) as u32
 }
 
 fn importance(inputs: &HostInputs, x: i32, y: i32) -> f32 {
@@ -72,7 +73,7 @@ fn importance(inputs: &HostInputs, x: i32, y: i32) -> f32 {
             count += 1;
         }
     }
-    (((count << 16) - sum) / count) as f32 / 65536.0
+    (((count << 16) - sum) / count) as f32 / SIMILARITY_UNIT
 }
 
 pub(super) fn reference(inputs: &HostInputs) -> Vec<f32> {

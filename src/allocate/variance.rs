@@ -51,7 +51,7 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
 }
 
 /// One pixel and the eight around it, a stride apart, that lie on the film, row by row.
-pub(super) fn square(push: &PriorityPush, pixel: usize) -> impl Iterator<Item = usize> {
+pub(super) fn window(push: &PriorityPush, pixel: usize) -> impl Iterator<Item = usize> {
     let [width, height, stride] = [push.size[0], push.size[1], push.stride].map(|n| n as usize);
     let [x, y] = [pixel % width, pixel / width];
     let beside = move |at: usize, end: usize| {
@@ -76,7 +76,7 @@ pub(super) fn noise(push: &PriorityPush, own: [f32; 4], around: [f32; 4]) -> f32
 pub(super) fn reference(inputs: &HostInputs) -> Vec<f32> {
     let HostInputs { stats, push, .. } = inputs;
     let of = |i: usize| {
-        let around = square(push, i).map(|j| moments(&stats[j]));
+        let around = window(push, i).map(|j| moments(&stats[j]));
         let sum = around.fold([0.0; 4], |sum: [f32; 4], m| std::array::from_fn(|k| sum[k] + m[k]));
         noise(push, moments(&stats[i]), sum)
     };

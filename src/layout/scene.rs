@@ -34,9 +34,7 @@ gpu_structs! {
         orthographic: uint,
     }
 
-    /// One eight-way compressed node (Ylitie et al. 2017) as obvhs lays it out; child and triangle indices are
-    /// global. 5 texels. `words[0..3]` = origin, `[3]` = exponents and inner mask, `[4]` = first child,
-    /// `[5]` = first primitive, `[6..8]` = child meta, then 8 bytes each of min x, max x, min y, max y, min z, max z.
+    /// One eight-way compressed node (Ylitie et al. 2017) as obvhs lays it out; child and triangle indices are global. 5 texels.
     struct BvhNode {
         /// Origin of the quantisation grid, world (or object) units.
         p: vec3,

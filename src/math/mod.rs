@@ -1,5 +1,5 @@
-//! Mathematics that both the host and the kernels need in a render. Each file is the CPU twin of a file under `glsl/shared`, with
-//! the same names and the same order of operations, in `f32`. Nothing here depends on scenes.
+//! Mathematics that both the host and the kernels need in a render: twins of functions under `glsl/shared`, with the same order of
+//! operations, in `f32` where nothing else is said. Nothing here depends on scenes.
 #![allow(clippy::excessive_precision, clippy::approx_constant, reason = "constants as the GLSL writes them")]
 pub mod fresnel;
 pub mod hash;

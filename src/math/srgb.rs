@@ -6,7 +6,7 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The inverse in a precision: sums over textures need more than pixels do.
+/// The inverse, for single and for double precision, which sums over textures need.
 macro_rules! linear_from_srgb {
     ($name:ident, $float:ty) => {
         /// Code value in [0, 1] to its linear value: the inverse of [`srgb_from_linear`].

@@ -51,7 +51,7 @@ pub fn fold(
                 fold_radiance(&mut stats[pixel], direct + indirect);
                 fold_light(&mut light[pixel], &split, stats[pixel].count);
                 let (added, l) = (luminance(split.other), &mut light[pixel]);
-                let squares = square(added - before, added - other(&stats[pixel], l));
+                let squares = cut_product(added - before, added - other(&stats[pixel], l));
                 l.indirect_m2 = (l.indirect_m2 + squares).clamp(0.0, MAX_M2);
             } else {
                 fold_radiance(&mut stats[pixel], Vec4::from(samples[record]).truncate());
@@ -107,7 +107,7 @@ fn move_mean(mean: vec3, by: Vec3, mut remainder: Kept, at: u32, bits: u32) -> V
     [0, 1, 2].map(|c| move_channel(mean[c], by[c], &mut remainder, at + c as u32 * bits, bits)).into()
 }
 
-fn square(a: f32, b: f32) -> f32 {
+fn cut_product(a: f32, b: f32) -> f32 {
     a.clamp(-MAX_DEVIATION, MAX_DEVIATION) * b.clamp(-MAX_DEVIATION, MAX_DEVIATION)
 }
 
@@ -121,7 +121,7 @@ fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
     };
     s.mean = mean.into();
     let moved = radiance - mean;
-    s.m2 = std::array::from_fn(|c| (s.m2[c] + square(off[c], moved[c])).min(MAX_M2));
+    s.m2 = std::array::from_fn(|c| (s.m2[c] + cut_product(off[c], moved[c])).min(MAX_M2));
 }
 
 /// Luminance of the mean of all light that is not kept.

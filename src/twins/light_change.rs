@@ -1,10 +1,10 @@
 //! Twin of `glsl/reproject/probe.comp` and `glsl/reproject/light_change.comp`.
 use crate::layout::{Camera, History, LightChange, NONE, Probe, SurfacePoint};
 use crate::math::hash::pcg;
+use crate::render::Carried;
 use crate::shaders::light_change::LEAST_SPACING;
 use crate::shaders::shared::probe_cell::PROBE_CELL;
 use crate::twins::path::Tracer;
-use crate::twins::reproject::Carried;
 use glam::Vec3;
 
 /// Cells across and down of a film.

@@ -1,4 +1,4 @@
-//! Plain CPU twins of the kernels and of the functions under `glsl/shared`: same names, same order of operations, `f32`.
+//! Plain CPU twins of the kernels and of the functions under `glsl/shared`, in `f32`, mostly with the same names and order of operations.
 //! Tests compare the kernels with them, and run statistics on them that a GPU would only slow down. No render uses them: code
 //! that a render runs on the CPU is in [`crate::math`] and [`crate::scene`], and twins call it there.
 #![allow(clippy::excessive_precision, clippy::approx_constant, reason = "constants as the GLSL writes them")]

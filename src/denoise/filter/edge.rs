@@ -2,7 +2,7 @@
 use super::pack::Packed;
 use crate::layout::vec3;
 use crate::settings::{FINITE_ABOVE_0, FROM_0, settings};
-use crate::shaders::shared::edge::{Constants, LEAST};
+use crate::shaders::shared::edge::{Constants, LEAST_EXPONENT};
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
 
@@ -83,5 +83,5 @@ impl Rates {
 
 /// The weight of a neighbour; 0 where it is unknown.
 pub fn edge_weight(q: &Packed, exponent: f32) -> f32 {
-    if q.count > 0.0 && exponent > LEAST { exponent.exp2() } else { 0.0 }
+    if q.count > 0.0 && exponent > LEAST_EXPONENT { exponent.exp2() } else { 0.0 }
 }

@@ -1,7 +1,8 @@
 //! What the filters make of a pixel before they trust it. Twin of `glsl/shared/sanitise.glsl`.
 use crate::layout::{vec3, vec4};
+use crate::math::octahedral::{octahedral_point, octahedral_vector};
 pub use crate::shaders::shared::sanitise::{FARTHEST, LARGEST, WIDEST};
-use glam::{Vec2, Vec3, vec2};
+use glam::{Vec2, Vec3};
 
 /// Radiance that some samples stand behind.
 pub fn known_radiance([r, g, b, count]: vec4) -> Option<Vec3> {
@@ -23,19 +24,8 @@ pub fn known_normal(normal: vec3) -> Vec3 {
     if !(length.is_finite() && length > 1e-20) {
         return Vec3::ZERO;
     }
-    let e = n.truncate() / n.abs().element_sum();
-    let sign = |v: f32| if v >= 0.0 { 1.0 } else { -1.0 };
-    let folded = vec2((1.0 - e.y.abs()) * sign(e.x), (1.0 - e.x.abs()) * sign(e.y));
-    let kept = if n.z < 0.0 { folded } else { e };
-    decode((kept.clamp(Vec2::NEG_ONE, Vec2::ONE) * 32767.0).round() / 32767.0)
-}
-
-/// As `octahedral_decode` of `glsl/shared/octahedral.glsl`.
-fn decode(e: Vec2) -> Vec3 {
-    let n = e.extend(1.0 - e.x.abs() - e.y.abs());
-    let t = (-n.z).max(0.0);
-    let toward = |v: f32| if v >= 0.0 { v - t } else { v + t };
-    Vec3::new(toward(n.x), toward(n.y), n.z).normalize()
+    let point = octahedral_point(n).clamp(Vec2::NEG_ONE, Vec2::ONE);
+    octahedral_vector((point * 32767.0).round() / 32767.0)
 }
 
 /// Channel of a guide in single precision that squares and products can be taken of; 0 where there is none.

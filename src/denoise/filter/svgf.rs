@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec4};
 use crate::settings::{FROM_0, settings};
-use crate::shaders::svgf::{Bind, Constants};
+use crate::shaders::svgf::{Bind, Constants, LEAST_DEVIATION};
 use crate::threads::each;
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
@@ -22,9 +22,6 @@ pub const ROW: Row = Row {
     make: |gpu, s, size| Ok(Box::new(Svgf::new(gpu, &s.edge, &s.svgf, s.footprint.levels, size)?)),
     reference: |input, s| reference(input, &s.edge, &s.svgf, s.footprint.levels),
 };
-
-/// Stands for 0, so that equal pixels are alike where nothing varies.
-const LEAST_DEVIATION: f32 = 1e-30;
 
 settings! {
     /// What `svgf` can be told, and `auto`, which has levels of it.

@@ -9,7 +9,7 @@ use crate::denoise::filter::{FilterInput, FilterSettings, guided, svgf};
 use crate::layout::{vec3, vec4};
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
-use crate::shaders::auto::{ENOUGH_FOR_SVGF, ENOUGH_TO_TELL_ONE, LEAST, OF_ONE_SAMPLE, RIDGE, ROUNDS};
+use crate::shaders::auto::{ENOUGH_FOR_SVGF, ENOUGH_TO_TELL_ONE, LEAST_NOISE, OF_ONE_SAMPLE, RIDGE, ROUNDS};
 use crate::shaders::auto_error::{FEW, LIMIT, MOST, NOISE, OWN, REACH};
 use crate::shaders::shared::candidates::{BRIGHT, LEAST_SHARE, TRUST};
 use crate::shaders::shared::dominated::DOMINATED;
@@ -226,7 +226,7 @@ fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
 /// An independent copy of the pixel misses it by both copies' noise, and has the pixel's in common with what a filter misses.
 fn matrix([squares, products, others]: [Vec4; 3]) -> Errors {
     let told = 0.5 * others.z;
-    let noise = told.min(squares.min_element()).max(LEAST * told);
+    let noise = told.min(squares.min_element()).max(LEAST_NOISE * told);
     [
         [2.0 * noise, noise, noise, noise, noise],
         [noise, squares.x, products.x, products.y, products.z],

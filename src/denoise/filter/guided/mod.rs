@@ -34,7 +34,7 @@ pub const ROW: Row = Row {
 };
 
 /// `vec4`s of a pixel's record in a strip.
-const RECORD: u64 = 8;
+const RECORD: u64 = shared::moments::MOMENTS as u64;
 
 choices! {
     /// How `guided` sums over windows.

@@ -1,5 +1,5 @@
 //! The guided filter by summed-area tables, as Bauszat, Eisemann and Magnor (EGSR 2011) have it: kept to be measured
-//! against [`super::guided`], whose sums keep their digits. Kernels: `glsl/guided_table_*.comp`.
+//! against [`super::guided`], whose sums keep their digits. Kernels: `glsl/guided/guided_table_*.comp`.
 use super::pack::Packed;
 use crate::denoise::filter::{Filter, Planes};
 use crate::error::Result;
