@@ -140,7 +140,7 @@ impl Args {
 }
 
 /// What became of a frame.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameReport {
     /// Its number.
     pub frame: u32,
@@ -226,17 +226,15 @@ fn render_frames(
             false if interrupt::flag().load(Ordering::SeqCst) => return Ok(Some(line)),
             _ => {}
         }
-        let frame = stage.frame(number, preview.as_deref_mut());
-        match &frame.result {
-            Err(Error::DeviceLost(what)) => {
-                let lost = Error::DeviceLost(what.clone());
-                reports.push(frame.report());
+        let (report, result) = stage.frame(number, preview.as_deref_mut());
+        match result {
+            Err(lost @ Error::DeviceLost(_)) => {
+                reports.push(report);
                 return Err(lost);
             }
             Ok(Exit::Interrupted) => return Ok(Some(line)),
             _ => {}
         }
-        let report = frame.report();
         tell(args, &report, numbers.end - number - 1, reports);
         reports.push(report);
     }

@@ -11,9 +11,7 @@ use crate::gpu::{FrameResources, Gpu};
 use crate::image::{self, FILTERED, Film};
 use crate::layout::Effects;
 use crate::render::settings::Settings;
-use crate::render::{
-    Carriage, Moves, Outputs, Renderer, Reproject, Reprojection, all_effects, called_for, can_carry, finished,
-};
+use crate::render::{Moves, Outputs, Renderer, Reproject, Reprojection, all_effects, called_for, can_carry, finished};
 use crate::scene::animation::{Animation, Turntable};
 use crate::scene::{Change, Loaded, Scene};
 use crate::settings::entry;
@@ -47,35 +45,6 @@ pub struct Stage<'a> {
     chain: Chain,
     /// The frame that the renderer's history is of.
     held: Option<u32>,
-}
-
-/// A frame that is over.
-pub struct FrameEnd {
-    number: u32,
-    skipped: bool,
-    seconds: f64,
-    pose_seconds: f64,
-    refit_cost: Option<f32>,
-    rebuilt: usize,
-    carriage: Option<Carriage>,
-    /// How it ended.
-    pub result: Result<Exit>,
-}
-
-impl FrameEnd {
-    /// In words and numbers.
-    pub fn report(self) -> FrameReport {
-        FrameReport {
-            frame: self.number,
-            skipped: self.skipped,
-            error: self.result.err().map(|e| e.to_string()),
-            seconds: self.seconds,
-            pose_seconds: self.pose_seconds,
-            refit_cost: self.refit_cost,
-            rebuilt: self.rebuilt,
-            carriage: self.carriage,
-        }
-    }
 }
 
 impl<'a> Stage<'a> {
@@ -145,26 +114,25 @@ impl<'a> Stage<'a> {
     }
 
     /// Renders a frame, if it is not finished. Nothing that fails here keeps later frames from being rendered.
-    pub fn frame(&mut self, number: u32, preview: Option<&mut Preview>) -> FrameEnd {
+    pub fn frame(&mut self, number: u32, preview: Option<&mut Preview>) -> (FrameReport, Result<Exit>) {
         let begun = Instant::now();
-        let (pose_seconds, refit_cost, rebuilt, result) = (0.0, None, 0, Ok(Exit::Done));
-        let (skipped, carriage) = (false, None);
-        let mut end = FrameEnd { number, skipped, seconds: 0.0, pose_seconds, refit_cost, rebuilt, carriage, result };
-        end.result = self.try_frame(number, preview, &mut end);
-        if end.result.is_err() {
+        let mut report = FrameReport { frame: number, ..Default::default() };
+        let result = self.try_frame(number, preview, &mut report);
+        if let Err(e) = &result {
+            report.error = Some(e.to_string());
             (self.chain, self.held) = (Chain::default(), None);
         }
-        end.seconds = begun.elapsed().as_secs_f64();
-        end
+        report.seconds = begun.elapsed().as_secs_f64();
+        (report, result)
     }
 
-    fn try_frame(&mut self, number: u32, preview: Option<&mut Preview>, end: &mut FrameEnd) -> Result<Exit> {
+    fn try_frame(&mut self, number: u32, preview: Option<&mut Preview>, report: &mut FrameReport) -> Result<Exit> {
         let (args, settings) = (self.args.of_frame(number)?, self.settings_of(number));
         let begun = Instant::now();
-        self.pose(number, end)?;
-        end.pose_seconds = begun.elapsed().as_secs_f64();
+        self.pose(number, report)?;
+        report.pose_seconds = begun.elapsed().as_secs_f64();
         if let Some(film) = self.finished_film(&args, &settings).filter(|_| !self.args.again) {
-            end.skipped = true;
+            report.skipped = true;
             outputs::save_pictures(&args, &film)?;
             // A run that was not interrupted has compiled in what this frame calls for.
             self.rest = self.rest.or(called_for(&self.scene, &settings, self.wanted()));
@@ -173,9 +141,9 @@ impl<'a> Stage<'a> {
         }
         outputs::check(&args)?;
         let begun = Instant::now();
-        self.hold(number, end)?;
+        self.hold(number, report)?;
         self.prepare(&settings)?;
-        end.pose_seconds += begun.elapsed().as_secs_f64();
+        report.pose_seconds += begun.elapsed().as_secs_f64();
         let carries = number.checked_sub(1).is_some_and(|before| self.held == Some(before));
         if !carries {
             self.chain = Chain::default();
@@ -187,7 +155,7 @@ impl<'a> Stage<'a> {
         // What is there of an interrupted frame is of no use: it begins anew, and a .png of it would look like a finished one.
         let Some(mut shot) = shot.filter(render::Taken::is_whole) else { return Ok(Exit::Interrupted) };
         if carries {
-            end.carriage = self.renderer.as_ref().map(Renderer::carriage).transpose()?;
+            report.carriage = self.renderer.as_ref().map(Renderer::carriage).transpose()?;
         }
         let exit = shot.finish(&args, false)?.exit;
         show(preview, shot.film(), &args)?;
@@ -218,18 +186,18 @@ impl<'a> Stage<'a> {
     }
 
     /// Sees to it that the renderer has the history of the frame before this one, where there is a file that holds it.
-    fn hold(&mut self, number: u32, end: &mut FrameEnd) -> Result<()> {
+    fn hold(&mut self, number: u32, report: &mut FrameReport) -> Result<()> {
         let Some(before) = number.checked_sub(1).filter(|&n| self.reproject.is_some() && self.held != Some(n)) else {
             return Ok(());
         };
         self.held = None;
         let Some(film) = self.chain.is_begun().then(|| self.film_of(before)).flatten() else { return Ok(()) };
-        self.pose(before, end)?;
+        self.pose(before, report)?;
         self.prepare(&self.settings_of(before))?;
         let renderer = self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))?;
         renderer.take_up(&mut FrameResources::new(&self.gpu)?, &film, &self.scene)?;
         self.held = Some(before);
-        self.pose(number, end)
+        self.pose(number, report)
     }
 
     fn film_of(&self, number: u32) -> Option<Film> {
@@ -238,14 +206,14 @@ impl<'a> Stage<'a> {
     }
 
     /// Moves the scene to where it is in a frame.
-    fn pose(&mut self, number: u32, end: &mut FrameEnd) -> Result<()> {
+    fn pose(&mut self, number: u32, report: &mut FrameReport) -> Result<()> {
         let mut pose = self.animation.at(f64::from(number) / self.args.fps)?;
         if let Some(camera) = &mut pose.camera {
             camera.framed = camera.framed.or(self.framed);
         }
         let change = self.scene.apply(&pose)?;
-        end.refit_cost = change.deformed.iter().map(|d| d.cost).reduce(f32::max);
-        end.rebuilt = change.deformed.iter().filter(|d| d.rebuilt).count();
+        report.refit_cost = change.deformed.iter().map(|d| d.cost).reduce(f32::max);
+        report.rebuilt = change.deformed.iter().filter(|d| d.rebuilt).count();
         self.change.add(change);
         Ok(())
     }
