@@ -26,6 +26,7 @@ mod parts;
 mod plan;
 mod point;
 pub mod reference;
+mod rounds;
 mod scatter;
 mod session;
 pub mod summary;

@@ -2,6 +2,7 @@
 use super::document::{Pass, Run, WarmUp};
 use super::grid::{Candidate, Shot};
 use super::motion::{Motion, Moving};
+use super::rounds::{Measured, Outcome, Runs};
 use crate::denoise::{Colour, Noisy, Recipe, Timed, filter, host_bytes, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime};
@@ -36,23 +37,6 @@ struct Warm {
     missed: Change,
 }
 
-/// One measured point, not judged yet.
-pub struct Measured {
-    /// Index of the candidate.
-    pub point: usize,
-    /// Its times; the errors are missing.
-    pub run: Run,
-    /// Its image.
-    pub picture: Picture,
-    /// What its first use took.
-    pub warm_up: WarmUp,
-    /// Device memory that it took.
-    pub device_bytes: u64,
-}
-
-/// The points of one shot, each measured or failed. Empty if it was stopped.
-pub type Outcome = Vec<(usize, Result<Measured>)>;
-
 /// The render of a shot.
 struct Rendered {
     gpu_ms: f64,
@@ -78,17 +62,6 @@ impl<'a> Session<'a> {
         let warm = shots.iter().map(|_| None).collect();
         let moving = motion.map(|motion| Moving::new(scene, motion)).transpose()?;
         Ok(Self { gpu, scene, moving, candidates, shots, warm, frame: FrameResources::new(gpu)? })
-    }
-
-    /// Renders a shot with a seed and filters it for its points, in the order of `points`.
-    pub fn run(&mut self, shot: usize, seed: u32, points: &[usize], stop: &dyn Fn() -> bool) -> Outcome {
-        let failed = |e: Error| points.iter().map(|&point| (point, Err(again(&e)))).collect();
-        let rendered = match self.render(shot, seed, stop) {
-            Ok(Some(rendered)) => rendered,
-            Ok(None) => return Vec::new(),
-            Err(e) => return failed(self.forget(shot).err().unwrap_or(e)),
-        };
-        points.iter().map(|&point| (point, self.measured(shot, seed, point, &rendered))).collect()
     }
 
     /// `None` if it was stopped.
@@ -227,6 +200,25 @@ impl<'a> Session<'a> {
         let size = [renderer.settings().width, renderer.settings().height];
         let picture = finite(interleaved(size, &filtered.colour))?;
         Ok(Measured { point, run, picture, warm_up, device_bytes })
+    }
+}
+
+impl Runs for Session<'_> {
+    const ALIKE: bool = false;
+
+    fn groups(&self) -> Vec<Vec<usize>> {
+        self.shots.iter().map(|shot| shot.points.clone()).collect()
+    }
+
+    /// Renders a shot with a seed and filters it for its points, in the order of `points`.
+    fn run(&mut self, shot: usize, seed: u32, points: &[usize], stop: &dyn Fn() -> bool) -> Outcome {
+        let failed = |e: Error| points.iter().map(|&point| (point, Err(again(&e)))).collect();
+        let rendered = match self.render(shot, seed, stop) {
+            Ok(Some(rendered)) => rendered,
+            Ok(None) => return Vec::new(),
+            Err(e) => return failed(self.forget(shot).err().unwrap_or(e)),
+        };
+        points.iter().map(|&point| (point, self.measured(shot, seed, point, &rendered))).collect()
     }
 }
 
