@@ -1,10 +1,11 @@
-//! Options shared by all commands that run on a device and write pictures.
-use super::finite;
+//! Options shared by commands that run on a device or write pictures.
+use super::{complain, finite, print, print_json};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, Gpu, Tracing};
 use crate::image::{WriteOptions, tone::ToneMap};
 use crate::settings::entry::Entry;
 use clap::{Arg, ArgAction};
+use serde::Serialize;
 
 /// Adds range, default and placeholder to the help of the options for the settings in `defaults`. An option whose help
 /// already states its default keeps it.
@@ -25,18 +26,12 @@ pub fn with_ranges(defaults: Vec<Entry>) -> impl FnMut(Arg) -> Arg {
     }
 }
 
-/// Options for the device and the output files.
+/// Options for the device and for what is printed.
 #[derive(Clone, clap::Args)]
 pub struct Common {
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
-    /// Exposure of PNG files in stops
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = finite)]
-    pub exposure: f64,
-    /// Tone curve of PNG files
-    #[arg(long, value_enum, default_value_t)]
-    pub tonemap: ToneMap,
     /// Run under the Vulkan validation layers and fail on any message
     #[arg(long)]
     pub validation: bool,
@@ -54,27 +49,51 @@ impl Common {
         !self.quiet && !self.json
     }
 
-    /// Opens the device that the options select, to trace rays as `tracing` says.
+    /// Prints what is odd, unless only the result is wanted.
+    pub fn warn(&self, warnings: &[String]) {
+        if self.talkative() {
+            warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
+        }
+    }
+
+    /// Prints what a command found: `found` as JSON or `text`, or nothing.
+    ///
+    /// # Errors
+    /// As [`print()`].
+    pub fn report(&self, found: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
+        match (self.json, self.quiet) {
+            (true, _) => print_json(found),
+            (false, true) => Ok(()),
+            (false, false) => print(&text()),
+        }
+    }
+
+    /// Opens the device that the options select, to trace rays as `tracing` says. What is compiled is kept for the next run.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn open(&self, tracing: Tracing) -> Result<Gpu> {
-        open(self.device.as_ref(), self.validation, tracing)
-    }
-
-    /// How radiance is converted for PNG files.
-    pub fn write_options(&self) -> WriteOptions {
-        WriteOptions { exposure: self.exposure as f32, tone_map: self.tonemap }
+        let (device, validation, cache) = (self.device.clone(), self.validation, gpu::cache_folder());
+        Gpu::open(&DeviceOptions { device, validation, cache, tracing, ..DeviceOptions::default() })
     }
 }
 
-/// Opens a device, which keeps what it compiles for the next run.
-///
-/// # Errors
-/// [`crate::error::Error::Device`].
-pub fn open(device: Option<&String>, validation: bool, tracing: Tracing) -> Result<Gpu> {
-    let (device, cache) = (device.cloned(), gpu::cache_folder());
-    Gpu::open(&DeviceOptions { device, validation, cache, tracing, ..DeviceOptions::default() })
+/// How .png files show radiance.
+#[derive(Clone, clap::Args)]
+pub struct PngOptions {
+    /// Exposure of PNG files in stops
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = finite)]
+    pub exposure: f64,
+    /// Tone curve of PNG files
+    #[arg(long, value_enum, default_value_t)]
+    pub tonemap: ToneMap,
+}
+
+impl PngOptions {
+    /// How radiance is converted.
+    pub fn write_options(&self) -> WriteOptions {
+        WriteOptions { exposure: self.exposure as f32, tone_map: self.tonemap }
+    }
 }
 
 /// Checks a number of frames per second.

@@ -5,7 +5,7 @@ mod options;
 mod output;
 mod points;
 
-use super::{Exit, common, complain, fail_on_messages, interrupt, print, print_json};
+use super::{Exit, complain, fail_on_messages, interrupt};
 use crate::cost::document::SceneInfo;
 use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, others, reference};
 use crate::error::{Error, Result};
@@ -28,12 +28,10 @@ pub fn run(args: &Args) -> Result<Exit> {
         return filters::run(args, image);
     }
     let path = args.scene.as_deref().ok_or_else(no_scene)?;
-    let gpu = open(args)?;
+    let gpu = args.common.open(args.tracing)?;
     let (scene, points) = Points::new(args, path, &gpu)?;
     let warnings = [&scene.warnings[..], &points.notes].concat();
-    if !args.quiet && !args.json {
-        warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
-    }
+    args.common.warn(&warnings);
     let plan = plan(args, path, &scene, points, &gpu)?;
     let folder = Folder::open(&args.output)?;
     let earlier = folder.earlier(&key(&gpu, &scene, &plan));
@@ -70,7 +68,7 @@ fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> R
 /// Measures with a progress bar. From here on there is something to save, so a signal only asks it to stop.
 fn watched<T>(args: &Args, folder: &Folder, measure: impl FnOnce(&Watch) -> Result<T>) -> Result<T> {
     let stop = interrupt::flag();
-    let shown = Shown::new(args.quiet || args.json);
+    let shown = Shown::new(!args.common.talkative());
     let progress = |what: &str, done: u64, total: u64| shown.set(what, done, total);
     let keep = |document: &Document| folder.keep(document);
     let found = measure(&Watch { stop: &|| stop.load(Ordering::SeqCst), progress: &progress, keep: &keep });
@@ -101,11 +99,7 @@ fn finish(
     }
     let (document, images) = (&document, &images);
     let written = folder.write(document, images, ended == Ended::Complete);
-    match (args.json, args.quiet) {
-        (true, _) => print_json(&Report { document, warnings })?,
-        (false, true) => {}
-        (false, false) => print(&text(document, &written))?,
-    }
+    args.common.report(&Report { document, warnings }, || text(document, &written))?;
     folder.failure().map_or(Ok(()), Err)?;
     match ended {
         Ended::Stopped => {
@@ -115,10 +109,6 @@ fn finish(
         _ if document.points.iter().any(|point| point.failed.is_some()) => Ok(Exit::PartlyFailed),
         Ended::Budget | Ended::Complete => Ok(Exit::Done),
     }
-}
-
-fn open(args: &Args) -> Result<Gpu> {
-    common::open(args.device.as_ref(), args.validation, args.tracing)
 }
 
 fn no_scene() -> Error {

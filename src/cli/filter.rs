@@ -2,10 +2,10 @@
 pub mod options;
 mod supersampling;
 
-use super::common::Common;
+use super::common::{Common, PngOptions};
 use super::compare::{self, check_sizes};
 use super::files::{Files, Item, check_distinct};
-use super::{Exit, fail_on_messages, print, print_json, readable};
+use super::{Exit, fail_on_messages, readable};
 use crate::denoise::filter::firefly::Fireflies;
 use crate::denoise::filter::{self, FilterSettings, Method};
 use crate::denoise::{self, Colour, Demodulation, Filtered, Recipe, file};
@@ -64,9 +64,12 @@ pub struct Args {
     /// none and oidn]
     #[arg(long, value_name = "N")]
     pub fireflies: Option<Fireflies>,
-    /// Options for the device and the output files.
+    /// The device, and what is printed.
     #[command(flatten)]
     pub common: Common,
+    /// How .png files show radiance.
+    #[command(flatten)]
+    pub png: PngOptions,
     /// Names of the layers.
     #[command(flatten)]
     pub layers: Layers,
@@ -135,7 +138,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         before: distance(&source, noisy_layer(args, &source))?,
         after: distance(&clean, result_layer(args))?,
     };
-    report(args, &summary)?;
+    args.common.report(&summary, || text(args, &summary))?;
     files.failure().map_or(Ok(()), Err)?;
     Ok(Exit::Done)
 }
@@ -190,7 +193,7 @@ fn check_filter(args: &Args) -> Result<()> {
 }
 
 fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
-    let options = args.common.write_options();
+    let options = args.png.write_options();
     let item = |path: &'a PathBuf| Item {
         path: path.clone(),
         fill: Box::new(move |stream| clean.encode(path, result_layer(args), &options, stream)),
@@ -272,14 +275,6 @@ fn shown(args: &Args, image: &Source, layer: Option<&str>) -> Result<Picture> {
 fn distance(args: &Args, image: &Source, layer: Option<&str>, reference: &Picture) -> Result<Option<Metrics>> {
     let picture = shown(args, image, layer)?;
     Ok((picture.non_finite() == 0).then(|| metrics::compare(&picture, reference)))
-}
-
-fn report(args: &Args, summary: &Summary) -> Result<()> {
-    match (args.common.json, args.common.quiet) {
-        (true, _) => print_json(summary),
-        (false, true) => Ok(()),
-        (false, false) => print(&text(args, summary)),
-    }
 }
 
 fn text(args: &Args, s: &Summary) -> String {

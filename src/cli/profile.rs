@@ -2,6 +2,7 @@
 mod fresh;
 mod text;
 
+use super::common::Common;
 use super::files::{Files, Item, check_distinct};
 use super::overrides::Overrides;
 use super::{Exit, print, print_json};
@@ -20,6 +21,12 @@ use std::path::PathBuf;
 /// and what they bind, and set beside the fastest copy and the fastest arithmetic that the device is seen to do; "+" marks what is
 /// more than was counted. Options override the settings of the scene file; defaults are for what it does not set.
 #[derive(clap::Args)]
+#[command(
+    mut_arg("validation", |arg| arg.help("Run under the Vulkan validation layers and fail on any message; times mean little \
+                                          then")),
+    mut_arg("json", |arg| arg.help("Print one JSON object: --compare reads it")),
+    mut_arg("quiet", |arg| arg.help("Print nothing but errors and, with --compare, the verdict")),
+)]
 pub struct Args {
     /// Scene file (.toml, .gltf, .glb), model (.obj, .ply), or the .json of an earlier profile, to compare it without another run
     pub scene: PathBuf,
@@ -39,21 +46,12 @@ pub struct Args {
     /// Filter every frame
     #[arg(long, value_name = "FILTER")]
     pub denoise: Option<Method>,
-    /// Device, by index or part of its name [default: the best one]
-    #[arg(long, value_name = "NAME")]
-    pub device: Option<String>,
     /// Who finds what rays meet [default: auto]
     #[arg(long, value_enum)]
     pub tracing: Option<Tracing>,
-    /// Run under the Vulkan validation layers and fail on any message; times mean little then
-    #[arg(long)]
-    pub validation: bool,
-    /// Print one JSON object: --compare reads it
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors and, with --compare, the verdict
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// The device, and what is printed.
+    #[command(flatten)]
+    pub common: Common,
     /// Replace the scene's own settings.
     #[command(flatten)]
     pub overrides: Overrides,
@@ -107,7 +105,7 @@ impl Args {
 
     /// Whether an option is given that only frames which run now can follow.
     fn says_how_to_render(&self) -> bool {
-        let Self { frames, denoise, device, tracing, validation, overrides, .. } = self;
+        let Self { frames, denoise, common: Common { device, validation, .. }, tracing, overrides, .. } = self;
         let options = [frames.is_some(), denoise.is_some(), device.is_some(), tracing.is_some(), *validation];
         options.contains(&true) || *overrides != Overrides::default()
     }
@@ -134,10 +132,10 @@ fn check_outputs(args: &Args) -> Result<()> {
 }
 
 fn report(args: &Args, profile: &Profile, warnings: &[String], comparison: Option<&Comparison>) -> Result<()> {
-    if args.json {
+    if args.common.json {
         return print_json(&Report { profile, warnings, comparison });
     }
-    let of_profile = if args.quiet { String::new() } else { text::of_profile(profile) };
-    let of_comparison = comparison.map_or_else(String::new, |found| text::of_comparison(found, args.quiet));
+    let of_profile = if args.common.quiet { String::new() } else { text::of_profile(profile) };
+    let of_comparison = comparison.map_or_else(String::new, |found| text::of_comparison(found, args.common.quiet));
     print(&(of_profile + &of_comparison))
 }

@@ -6,7 +6,7 @@ mod spans;
 mod summary;
 
 use super::checkpoint::{self, CheckpointFile};
-use super::common::Common;
+use super::common::{Common, PngOptions};
 use super::files::Files;
 use super::overrides::Overrides;
 use super::{Exit, complain, fail_on_messages, interrupt};
@@ -25,7 +25,7 @@ pub use shot::{CHOICES, FRAME};
 pub use spans::Spans;
 use std::path::PathBuf;
 use std::time::Duration;
-use summary::{Outcome, report};
+use summary::{Outcome, text};
 
 /// Which effects are compiled into the kernels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -94,9 +94,12 @@ pub struct Args {
     /// Who finds what rays meet
     #[arg(long, value_enum, default_value_t)]
     pub tracing: Tracing,
-    /// Device and output.
+    /// The device, and what is printed.
     #[command(flatten)]
     pub common: Common,
+    /// How .png files show radiance.
+    #[command(flatten)]
+    pub png: PngOptions,
     /// Replace the scene's own settings.
     #[command(flatten)]
     pub overrides: Overrides,
@@ -133,9 +136,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let (scene, settings) = host.time("load scene", || load(args))?;
     let settings = plan.as_ref().map_or(Ok(settings), |plan| planned::settings(args, plan, &scene))?;
     let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
-    if args.common.talkative() {
-        scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
-    }
+    args.common.warn(&scene.warnings);
     let gpu = host.time("open device", || args.common.open(args.tracing))?;
     check_room(args.denoise, &settings, &gpu)?;
     let plan = match plan {
@@ -275,7 +276,8 @@ impl Taken<'_> {
         if alone {
             files.end();
         }
-        report(args, &outcome.summary(&written))?;
+        let summary = outcome.summary(&written);
+        args.common.report(&summary, || text(&summary))?;
         files.failure().map_or(Ok(()), Err)?;
         Ok(Ended { exit: if whole { Exit::Done } else { Exit::Interrupted }, written })
     }
@@ -399,7 +401,7 @@ mod tests {
         assert_eq!(parse(&["scenes/box/room.toml"]).output_files(), [Path::new("room.exr")]);
         assert_eq!(parse(&["room.toml", "-o", "a.png", "-o", "b.exr"]).output_files().len(), 2);
         assert_eq!(parse(&["room.v2.obj"]).output_files(), [Path::new("room.v2.exr")]);
-        assert_eq!(parse(&["room.toml", "--exposure=-1.5"]).common.write_options().exposure, -1.5);
+        assert_eq!(parse(&["room.toml", "--exposure=-1.5"]).png.write_options().exposure, -1.5);
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! `tallow cost --filter-only`: filters on a given image.
-use super::{Args, Folder, finish, name, open, runs, watched};
+use super::{Args, Folder, finish, name, runs, watched};
 use crate::cli::filter::options::Overrides;
 use crate::cli::{Exit, fail_on_messages, quoted};
 use crate::cost::document::SceneInfo;
@@ -35,7 +35,7 @@ pub fn run(args: &Args, image: &Path) -> Result<Exit> {
         budget: args.budget(),
         reference: reference::read(file, size, None)?,
     };
-    let gpu = open(args)?;
+    let gpu = args.common.open(args.tracing)?;
     let folder = Folder::open(&args.output)?;
     let earlier = folder.earlier(&key(&gpu, &plan));
     let runs_before = earlier.as_ref().map_or(0, runs);

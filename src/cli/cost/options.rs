@@ -1,6 +1,6 @@
 //! Options of `tallow cost`.
 use crate::allocate::{AllocateOverrides as Allocate, Policy};
-use crate::cli::common::with_ranges;
+use crate::cli::common::{Common, with_ranges};
 use crate::cli::filter::options as filter;
 use crate::cli::finite;
 use crate::cli::overrides::Overrides;
@@ -103,21 +103,12 @@ pub struct Args {
     /// Measure filters on this image instead of a scene; needs --reference
     #[arg(long, value_name = "IMAGE", requires = "reference", conflicts_with = "scene")]
     pub filter_only: Option<PathBuf>,
-    /// Device, by index or part of its name [default: the best one]
-    #[arg(long, value_name = "NAME")]
-    pub device: Option<String>,
     /// Who finds what rays meet
     #[arg(long, value_enum, default_value_t, conflicts_with = "filter_only")]
     pub tracing: Tracing,
-    /// Run under the Vulkan validation layers and fail on any message
-    #[arg(long)]
-    pub validation: bool,
-    /// Print the document as one JSON object
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// The device, and what is printed.
+    #[command(flatten)]
+    pub common: Common,
     /// Size of the film.
     #[command(flatten)]
     pub film: FilmOptions,

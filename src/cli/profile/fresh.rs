@@ -1,6 +1,6 @@
 //! Runs the frames of a profile.
 use super::Args;
-use crate::cli::{common, complain, fail_on_messages, render};
+use crate::cli::{fail_on_messages, render};
 use crate::denoise::filter::{Method, Row};
 use crate::error::{Error, Result};
 use crate::gpu::PassTime;
@@ -35,16 +35,13 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     args.overrides.apply(&mut settings);
     settings.validate()?;
     let scene = file.load()?.scene;
-    let is_talkative = !args.quiet && !args.json;
-    if is_talkative {
-        scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
-    }
+    args.common.warn(&scene.warnings);
     old.map_or(Ok(()), |old| check_beside(old, &scene, &settings, filter))?;
-    let gpu = common::open(args.device.as_ref(), args.validation, args.tracing.unwrap_or_default())?;
+    let gpu = args.common.open(args.tracing.unwrap_or_default())?;
     render::check_room(args.denoise, &settings, &gpu)?;
     let count = usize::from(args.frames.unwrap_or(FRAMES));
     let bar = ProgressBar::new(2 * count as u64 + 1);
-    if !is_talkative {
+    if !args.common.talkative() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
     let measured = measure(&gpu, &scene, &settings, filter, count, &mut || bar.inc(1))?;

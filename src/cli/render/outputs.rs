@@ -74,7 +74,7 @@ pub fn save_pictures(args: &Args, film: &Film) -> Result<()> {
 
 /// The images: a film's own, and that of its samples.
 pub fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
-    let options = args.common.write_options();
+    let options = args.png.write_options();
     let images = args.output_files().into_iter().map(|path| Item::image(path, film, options));
     let heatmap = |path: &PathBuf| Item { path: path.clone(), fill: Box::new(|stream| heatmap(film, stream)) };
     images.chain(args.heatmap.iter().map(heatmap)).collect()

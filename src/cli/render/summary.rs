@@ -1,7 +1,5 @@
 //! What is said of a render at its end.
-use super::{Args, Spans};
-use crate::cli::{print, print_json};
-use crate::error::Result;
+use super::Spans;
 use crate::gpu::Gpu;
 use crate::image::Film;
 use crate::plan::Plan;
@@ -113,19 +111,8 @@ impl Outcome<'_> {
     }
 }
 
-/// Prints it as the user wants it.
-///
-/// # Errors
-/// As [`print()`].
-pub fn report(args: &Args, summary: &Summary) -> Result<()> {
-    match (args.common.json, args.common.quiet) {
-        (true, _) => print_json(summary),
-        (false, true) => Ok(()),
-        (false, false) => print(&text(summary)),
-    }
-}
-
-fn text(s: &Summary) -> String {
+/// In words.
+pub fn text(s: &Summary) -> String {
     let speed = s.traced as f64 * 1e-6 / s.seconds.max(1e-9);
     let filtered =
         if s.filter_seconds > 0.0 { format!(", filtered in {:.2} s", s.filter_seconds) } else { String::new() };

@@ -3,8 +3,8 @@ use super::chain::Chain;
 use super::preview::Preview;
 use super::survey::Survey;
 use super::{Args, FrameReport};
+use crate::cli::Exit;
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
-use crate::cli::{Exit, complain};
 use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu};
@@ -68,9 +68,7 @@ impl<'a> Stage<'a> {
             let what = "nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)";
             warnings.push(what.to_owned());
         }
-        if args.render.common.talkative() {
-            warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
-        }
+        args.render.common.warn(&warnings);
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(args.render.denoise, &settings, &gpu)?;
         render::check_stride(&args.render, &settings)?;
@@ -282,7 +280,7 @@ fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
 
 fn show(preview: Option<&mut Preview>, film: &Film, args: &render::Args) -> Result<()> {
     let Some(preview) = preview else { return Ok(()) };
-    preview.add(film, &args.common.write_options()).map_err(|what| Error::Usage(format!("--preview: {what}")))
+    preview.add(film, &args.png.write_options()).map_err(|what| Error::Usage(format!("--preview: {what}")))
 }
 
 /// How samples are carried: as asked for, or where something moves and nothing speaks against it.
