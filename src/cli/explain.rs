@@ -3,7 +3,7 @@ use super::{Exit, complain, print, print_json, readable};
 use crate::cost::document::Estimate;
 use crate::cost::interval;
 use crate::error::{Error, Result};
-use crate::gpu::{DeviceKind, DeviceOptions, FrameResources, Gpu, PassTime};
+use crate::gpu::{DeviceKind, DeviceOptions, FrameResources, Gpu, total_ms};
 use crate::layout::*;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Job, Outputs, Renderer};
@@ -157,7 +157,7 @@ impl Variant {
     /// Renders once and returns the GPU time in milliseconds.
     fn run(&mut self) -> Result<f64> {
         let times = Job::new(&self.renderer).run_to_end(&mut self.frame)?.times;
-        Ok(times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6)
+        Ok(total_ms(&times))
     }
 }
 

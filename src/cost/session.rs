@@ -280,7 +280,7 @@ fn trace(job: &Job, frame: &mut FrameResources, stop: &dyn Fn() -> bool) -> Resu
 fn passes(times: &[PassTime]) -> Vec<Pass> {
     let mut passes: Vec<Pass> = Vec::new();
     for time in times {
-        let ms = time.duration_ns() as f64 * 1e-6;
+        let ms = time.duration_ms();
         match passes.iter_mut().find(|pass| pass.pass == time.name) {
             Some(pass) => (pass.calls, pass.ms) = (pass.calls + 1, pass.ms + ms),
             None => passes.push(Pass { pass: time.name.to_owned(), calls: 1, ms }),

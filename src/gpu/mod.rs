@@ -56,7 +56,7 @@ pub use oidn::{OIDN_VARIABLE, Oidn, OidnInput, Texels};
 pub use ray_query::Tracing;
 pub use recorder::Recorder;
 pub use shape::{BoundRange, KernelCode, Pass, PassObserver, PassShape};
-pub use timing::{Calibration, PassTime, host_ns};
+pub use timing::{Calibration, PassTime, host_ns, total_ms};
 pub use tuning::Tuning;
 
 use crate::error::{Error, Result};

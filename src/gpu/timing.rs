@@ -24,6 +24,16 @@ impl PassTime {
     pub fn duration_ns(&self) -> u64 {
         self.end_ns.saturating_sub(self.begin_ns)
     }
+
+    /// Duration of the pass in milliseconds.
+    pub fn duration_ms(&self) -> f64 {
+        self.duration_ns() as f64 * 1e-6
+    }
+}
+
+/// Sum of the durations of some passes in milliseconds.
+pub fn total_ms<'a>(passes: impl IntoIterator<Item = &'a PassTime>) -> f64 {
+    passes.into_iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6
 }
 
 /// Nanoseconds since the first call of this function, on a monotonic clock.
@@ -230,5 +240,6 @@ mod tests {
         assert_eq!((slow.begin_ns, slow.duration_ns()), (u64::MAX, 0));
         let early = Clock { bits: 64, period: 2.5 }.pass("early", 100, [110, 150]);
         assert_eq!(early, PassTime { name: "early", begin_ns: 275, end_ns: 375 });
+        assert_eq!(total_ms(&[early, late, early]), 200e-6);
     }
 }

@@ -4,7 +4,7 @@ use super::{Target, outputs};
 use crate::denoise::filter::Method;
 use crate::denoise::{Chain, Colour, Noisy, Recipe, timed};
 use crate::error::{Error, Result};
-use crate::gpu::{FrameResources, Gpu, PassTime};
+use crate::gpu::{FrameResources, Gpu, PassTime, total_ms};
 use crate::render::settings::Settings;
 use crate::render::{Renderer, Step};
 use crate::scene::Scene;
@@ -160,7 +160,7 @@ impl<'a> Probe<'a> {
         self.renderer.set_seed(seed);
         let (mut start_ms, mut samples_ms) = (0.0, 0.0);
         for step in steps {
-            let ms = milliseconds(&self.renderer.run(&mut self.frame, &step)?);
+            let ms = total_ms(&self.renderer.run(&mut self.frame, &step)?);
             let traces = matches!(step, Step::Uniform(_) | Step::Listed(_));
             *(if traces { &mut samples_ms } else { &mut start_ms }) += ms;
         }
@@ -170,7 +170,7 @@ impl<'a> Probe<'a> {
             let (colour, times) = self.filtered(method)?.unzip();
             let pixels = colour.map(|[r, g, b]| (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect());
             image.filtered.push(pixels.map(finite).transpose()?);
-            image.filter_ms.push(times.map_or(0.0, |times| milliseconds(&times)));
+            image.filter_ms.push(times.map_or(0.0, |times| total_ms(&times)));
         }
         self.spent_ms += start_ms + samples_ms + image.filter_ms.iter().sum::<f64>();
         Ok(image)
@@ -188,7 +188,7 @@ impl Probe<'_> {
         self.renderer = Renderer::new(self.gpu, self.scene, &settings, outputs(self.methods))?;
         let mut took = 0.0;
         for step in self.renderer.steps() {
-            took += milliseconds(&self.renderer.run(&mut self.frame, &step)?);
+            took += total_ms(&self.renderer.run(&mut self.frame, &step)?);
         }
         self.spent_ms += took;
         Ok(took)
@@ -243,10 +243,6 @@ fn finite(pixels: Vec<[f32; 3]>) -> Result<Vec<[f32; 3]>> {
         0 => Ok(pixels),
         n => Err(Error::Device(format!("{n} pixels of a probe are NaN or infinite"))),
     }
-}
-
-fn milliseconds(times: &[PassTime]) -> f64 {
-    times.iter().map(|time| time.duration_ns() as f64 * 1e-6).sum()
 }
 
 #[cfg(test)]

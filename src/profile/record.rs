@@ -4,7 +4,7 @@ use super::spread::{Spread, median};
 use super::work::Work;
 use super::{Ceilings, FrameRun};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, Pass, PassTime};
+use crate::gpu::{Gpu, Pass, PassTime, total_ms};
 use crate::machine;
 use crate::render::settings::Settings;
 use crate::render::{Counters, traces_paths};
@@ -265,8 +265,8 @@ impl Host {
 
 impl Overhead {
     fn of(timed: &[FrameRun], untimed: &[FrameRun]) -> Self {
-        let milliseconds = |run: &FrameRun| run.wall.duration_ns() as f64 * 1e-6;
-        let [timed, untimed] = [timed, untimed].map(|runs| runs.iter().map(milliseconds).collect::<Vec<f64>>());
+        let wall = |run: &FrameRun| run.wall.duration_ms();
+        let [timed, untimed] = [timed, untimed].map(|runs| runs.iter().map(wall).collect::<Vec<f64>>());
         let differences: Vec<f64> = timed.iter().zip(&untimed).map(|(with, without)| with - without).collect();
         Self { cost_ms: median(&differences), timed_ms: Spread::of(timed), untimed_ms: Spread::of(untimed) }
     }
@@ -280,7 +280,7 @@ fn fastest(before: &Ceilings, arithmetic_gop_s_after: f64) -> Ceilings {
 /// Of all passes, or of one.
 fn milliseconds_of(passes: &[Pass], name: Option<&str>) -> f64 {
     let of = passes.iter().filter(|pass| name.is_none_or(|name| pass.time.name == name));
-    of.map(|pass| pass.time.duration_ns()).sum::<u64>() as f64 * 1e-6
+    total_ms(of.map(|pass| &pass.time))
 }
 
 /// The greatest number of nanoseconds that all times since the first are multiples of.

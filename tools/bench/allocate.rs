@@ -46,7 +46,7 @@ fn main() -> Result<()> {
             })?;
             let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
             for t in &times {
-                let ms = t.duration_ns() as f64 * 1e-6;
+                let ms = t.duration_ms();
                 *sums.entry(t.name).or_default() += ms;
                 *sums.entry("all").or_default() += ms;
             }

@@ -10,7 +10,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 use tallow::denoise::filter::{self, Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
-use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime, total_ms};
 use tallow::layout::Guide;
 
 /// Pause after a peer's run, whose threads spin for a while before they sleep and would take our cores.
@@ -127,8 +127,7 @@ struct Ours {
 
 impl Ours {
     fn milliseconds(&self, of: impl Fn(usize, &PassTime) -> bool) -> f64 {
-        let ms = |p: &PassTime| p.duration_ns() as f64 * 1e-6;
-        let run = |run: &Vec<PassTime>| run.iter().enumerate().filter(|(i, p)| of(*i, p)).map(|(_, p)| ms(p)).sum();
+        let run = |run: &Vec<PassTime>| total_ms(run.iter().enumerate().filter(|(i, p)| of(*i, p)).map(|(_, p)| p));
         median(self.runs.iter().map(run).collect())
     }
 

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::Parser;
 use std::path::PathBuf;
 use tallow::denoise::{Filtered, Noisy, Recipe};
-use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu, total_ms};
 use tallow::image::{Picture, metrics};
 use tallow::plan::{Plan, Target, plan, usual_methods};
 use tallow::profile::median;
@@ -53,7 +53,7 @@ fn rendered(gpu: &Gpu, scene: &Loaded, plan: &Plan) -> Result<(f64, Picture)> {
         let [r, g, b] = clean.colour;
         picture.pixels = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
     }
-    Ok((times.iter().map(|time| time.duration_ns() as f64 * 1e-6).sum(), picture))
+    Ok((total_ms(&times), picture))
 }
 
 fn line(what: &str, plans: &[Plan], ratios: &[f64], limits: [f64; 2]) {

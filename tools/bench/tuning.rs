@@ -6,7 +6,7 @@ use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use tallow::denoise::filter::{FILTERS, FilterSettings};
 use tallow::denoise::{Demodulation, Denoiser};
-use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime, Tuning};
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning, total_ms};
 use tallow::profile::median;
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer, traces_paths};
@@ -105,16 +105,12 @@ fn choices(all: Vec<(String, Tuning)>) -> Result<Vec<Choice>> {
     all.into_iter().map(|(name, tuning)| Ok((name, open(Some(tuning))?))).collect()
 }
 
-fn milliseconds<'a>(passes: impl Iterator<Item = &'a PassTime>) -> f64 {
-    passes.map(|pass| pass.duration_ns() as f64 * 1e-6).sum()
-}
-
 fn paths(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
     let renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::default())?;
     let mut frame = FrameResources::new(gpu)?;
     Ok(Box::new(move || {
         let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
-        Ok(milliseconds(times.iter().filter(|pass| traces_paths(pass.name))))
+        Ok(total_ms(times.iter().filter(|pass| traces_paths(pass.name))))
     }))
 }
 
@@ -127,7 +123,7 @@ fn placing(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
     let mut frame = FrameResources::new(gpu)?;
     Ok(Box::new(move || {
         let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
-        Ok(milliseconds(times.iter().filter(|pass| PLACING.contains(&pass.name))))
+        Ok(total_ms(times.iter().filter(|pass| PLACING.contains(&pass.name))))
     }))
 }
 
@@ -139,7 +135,7 @@ fn filter(gpu: &Gpu, scene: &Loaded, name: &str) -> Result<Run> {
     let row = FILTERS.iter().find(|row| row.name == name).context("no such filter")?;
     let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light)?;
     let gpu = gpu.clone();
-    Ok(Box::new(move || Ok(milliseconds(gpu.run(&mut frame, |rec| denoiser.record(rec))?.iter()))))
+    Ok(Box::new(move || Ok(total_ms(&gpu.run(&mut frame, |rec| denoiser.record(rec))?))))
 }
 
 /// Prints the median time of each choice, and its ratio to the first's, or why a device refuses it.

@@ -1,7 +1,7 @@
 //! The filters' times, beside those of EAW's table 2 and GIF's table 2, both on an NVIDIA GTX 285.
 use super::{Section, push};
 use tallow::denoise::filter::{self, FilterInput, FilterSettings, Planes, Row};
-use tallow::gpu::{FrameResources, Gpu};
+use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::layout::Guide;
 use tallow::report::html::Table;
 
@@ -48,7 +48,7 @@ pub fn measure(gpu: &Gpu) -> anyhow::Result<Section> {
     let input = input([1024, 768]);
     for line in GIF {
         let row = filter::find(line.filter).expect("a row of the table");
-        let ms = milliseconds(gpu, row, &FilterSettings::default().with(line.set), &input)?;
+        let ms = median_ms(gpu, row, &FilterSettings::default().with(line.set), &input)?;
         push(&mut table, [line.filter.into(), line.what.into(), format!("{ms:.2}"), format!("{:.0}", line.published)]);
     }
     section.tables.push(table);
@@ -62,7 +62,7 @@ fn eaw(gpu: &Gpu, size: [u32; 2], published: &[[f64; 3]; 4]) -> anyhow::Result<T
     for (weights, published) in published.iter().enumerate() {
         let mut row = vec![weights.to_string()];
         for (levels, published) in LEVELS.into_iter().zip(published) {
-            let ms = milliseconds(gpu, atrous, &weighted(weights, levels), &input)?;
+            let ms = median_ms(gpu, atrous, &weighted(weights, levels), &input)?;
             row.push(format!("{ms:.2} / {published:.1}"));
         }
         push(&mut table, row);
@@ -86,14 +86,14 @@ fn weighted(weights: usize, levels: u32) -> FilterSettings {
 ///
 /// # Errors
 /// Those of the device.
-pub fn milliseconds(gpu: &Gpu, row: &Row, settings: &FilterSettings, input: &FilterInput) -> anyhow::Result<f64> {
+pub fn median_ms(gpu: &Gpu, row: &Row, settings: &FilterSettings, input: &FilterInput) -> anyhow::Result<f64> {
     let planes = Planes::new(gpu, input)?;
     let filter = row.compile(gpu, settings, planes.size)?;
     let mut frame = FrameResources::new(gpu)?;
     let mut times = Vec::new();
     for _ in 0..=RUNS {
         let passes = gpu.run(&mut frame, |rec| filter.record(rec, &planes))?;
-        times.push(passes.iter().map(|p| p.duration_ns()).sum::<u64>() as f64 * 1e-6);
+        times.push(total_ms(&passes));
     }
     times.remove(0);
     times.sort_by(f64::total_cmp);

@@ -2,7 +2,7 @@
 use super::view::View;
 use crate::Args;
 use anyhow::anyhow;
-use tallow::gpu::{FrameResources, Gpu, PassTime};
+use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::layout::{Guide, PixelStats, vec3, vec4};
 use tallow::render::settings::{Settings, Split};
 use tallow::render::{Job, Outputs, Renderer, Step, traces_paths};
@@ -63,10 +63,7 @@ pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
         renderer.steps().find(kind).map_or(Ok(Vec::new()), |step| renderer.run(&mut frame, &step))?;
     }
     let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
-    let took = |counts: fn(&str) -> bool| {
-        let ns: u64 = times.iter().filter(|pass| counts(pass.name)).map(PassTime::duration_ns).sum();
-        ns as f64 * 1e-6
-    };
+    let took = |counts: fn(&str) -> bool| total_ms(times.iter().filter(|pass| counts(pass.name)));
     let (ms, path_ms) = (took(|name| name != "primary_hit"), took(|name| traces_paths(name) || name == "accumulate"));
     let tile = &renderer.film().tiles[0];
     let (stats, light) = (tile.stats.read()?, tile.light.read()?);

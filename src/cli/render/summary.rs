@@ -1,6 +1,6 @@
 //! What is said of a render at its end.
 use super::Spans;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, total_ms};
 use crate::image::Film;
 use crate::plan::Plan;
 use crate::render::{Counters, Status, StopReason, film};
@@ -82,7 +82,7 @@ impl Outcome<'_> {
     pub fn summary(&self, written: &[PathBuf]) -> Summary {
         let Self { gpu, scene, film, host, status, counters, plan, notes } = self;
         let counts = film::counts(film, "samples").unwrap_or_default();
-        let gpu_ms = status.times.iter().map(|pass| pass.duration_ns() as f64 * 1e-6).sum();
+        let gpu_ms = total_ms(&status.times);
         let whole = status.stopped != StopReason::Interrupted;
         let missed = plan.as_ref().filter(|_| whole).and_then(|plan| plan.missed(gpu_ms));
         Summary {

@@ -6,7 +6,7 @@ use crate::view::View;
 use anyhow::{Result, anyhow};
 use tallow::denoise::filter::{FilterSettings, Method, OidnQuality, Scales};
 use tallow::denoise::{Clean, ExpectedError, Filtered, Noisy, Recipe};
-use tallow::gpu::{FrameResources, Gpu, PassTime};
+use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::image::{Picture, metrics};
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
@@ -86,18 +86,18 @@ fn images(
     let status = job.run_to_end(&mut FrameResources::new(gpu)?)?;
     let noisy = job.film(&status)?.picture(None).map_err(|what| anyhow!(what))?;
     let filtered = contenders.iter().map(|contender| {
-        let (mut milliseconds, mut expected) = (Vec::new(), None);
+        let (mut took, mut expected) = (Vec::new(), None);
         let mut picture = noisy.clone();
         // The first run makes kernels and loads weights.
         for _ in 0..=args.runs {
             let Clean { colour: [r, g, b], times, expected: told, .. } =
                 contender.filter(gpu, Noisy::of_film(&renderer)?)?;
             picture.pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
-            milliseconds.push(times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6);
+            took.push(total_ms(&times));
             expected = told;
         }
-        milliseconds[1..].sort_unstable_by(f64::total_cmp);
-        Ok(Image { picture, ms: milliseconds[1 + (milliseconds.len() - 2) / 2], expected })
+        took[1..].sort_unstable_by(f64::total_cmp);
+        Ok(Image { picture, ms: took[1 + (took.len() - 2) / 2], expected })
     });
     let filtered = filtered.collect::<Result<Vec<_>>>()?;
     Ok((noisy, filtered))

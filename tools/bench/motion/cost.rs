@@ -2,7 +2,7 @@
 use anyhow::{Context, Result};
 use std::path::Path;
 use std::time::Instant;
-use tallow::gpu::{FrameResources, Gpu};
+use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::render::{Outputs, Renderer, traces_paths};
 use tallow::report::table;
 use tallow::scene::description::*;
@@ -54,9 +54,7 @@ fn measure(
         for step in renderer.steps() {
             passes.extend(renderer.run(&mut frame, &step)?);
         }
-        let of = |counts: fn(&str) -> bool| {
-            passes.iter().filter(|p| counts(p.name)).map(|p| p.duration_ns() as f64 * 1e-6).sum::<f64>()
-        };
+        let of = |counts: fn(&str) -> bool| total_ms(passes.iter().filter(|p| counts(p.name)));
         let all = [posed, recorded, of(|name| name == "upload"), of(traces_paths)];
         times.iter_mut().zip(all).filter(|_| number > 0).for_each(|(times, ms)| times.push(ms));
         let s = renderer.scene();

@@ -6,7 +6,7 @@ use std::time::Instant;
 use tallow::allocate::policy;
 use tallow::denoise::filter::Method;
 use tallow::denoise::{Filtered, Noisy, Recipe};
-use tallow::gpu::{FrameResources, Gpu};
+use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::image::{Film, Picture, Samples, metrics};
 use tallow::layout::NONE;
 use tallow::render::settings::Settings;
@@ -114,8 +114,7 @@ fn hierarchies(gpu: &Gpu, name: &str, loaded: &Loaded, frames: u32) -> Result<Ve
             let mut path_ms = 0.0;
             for step in renderer.steps() {
                 let times = renderer.run(&mut frame, &step)?;
-                path_ms +=
-                    times.iter().filter(|t| traces_paths(t.name)).map(|t| t.duration_ns() as f64 * 1e-6).sum::<f64>();
+                path_ms += total_ms(times.iter().filter(|t| traces_paths(t.name)));
             }
             poses.push(ms);
             speeds.push(renderer.counters()?.rays() as f64 * 1e-3 / path_ms);

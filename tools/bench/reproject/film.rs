@@ -4,7 +4,7 @@ use glam::Vec3;
 use tallow::allocate::policy;
 use tallow::denoise::filter::Method;
 use tallow::denoise::{Clean, Filtered, Noisy, Recipe};
-use tallow::gpu::{FrameResources, Gpu, PassTime};
+use tallow::gpu::{FrameResources, Gpu, PassTime, total_ms};
 use tallow::image::Picture;
 use tallow::layout::Camera;
 use tallow::render::{Moves, Outputs, Renderer, Reproject, Step};
@@ -28,13 +28,9 @@ pub struct Film {
     arm: Arm,
 }
 
-pub fn milliseconds(times: &[PassTime], of: impl Fn(&str) -> bool) -> f64 {
-    times.iter().filter(|t| of(t.name)).fold(0.0, |sum, t| sum + t.duration_ns() as f64 * 1e-6)
-}
-
-/// Passes that carry samples, and those that find how light has changed.
-pub fn carries(name: &str) -> bool {
-    ["remember", "edges", "project", "carry", "gather", "probe", "light_change"].contains(&name)
+/// Whether a pass carries samples, or finds how light has changed.
+pub fn carries(pass: &PassTime) -> bool {
+    ["remember", "edges", "project", "carry", "gather", "probe", "light_change"].contains(&pass.name)
 }
 
 impl Film {
@@ -86,7 +82,7 @@ impl Film {
         let Clean { colour: [r, g, b], times, .. } =
             Filtered::new(&self.gpu, Noisy::of_film(&self.renderer)?, &Recipe::new(method))?.join(&self.gpu)?;
         let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
-        Ok((Picture { pixels, ..picture }, milliseconds(&times, |_| true)))
+        Ok((Picture { pixels, ..picture }, total_ms(&times)))
     }
 }
 

@@ -1,12 +1,12 @@
 //! Frames of a camera that moves through a scene, or of what a scene animates: the error of each, how much it flickers,
 //! and how different all look.
-use crate::film::{Arm, Film, carries, milliseconds};
+use crate::film::{Arm, Film, carries};
 use crate::reference::Reference;
 use crate::{View, plot, seen};
 use anyhow::{Result, anyhow};
 use glam::{Quat, Vec3};
 use std::path::{Path, PathBuf};
-use tallow::gpu::Gpu;
+use tallow::gpu::{Gpu, total_ms};
 use tallow::image::{self, Picture, WriteOptions};
 use tallow::layout::{Camera, vec3};
 use tallow::render::{Carriage, Reproject, ReprojectOverrides};
@@ -97,7 +97,7 @@ fn measure(gpu: &Gpu, args: &Args, spp: u32, (name, base, arm): Named, sequence:
         let (picture, filtering) = film.picture()?;
         errors.push(reference.error(&picture));
         offs.push(reference.off(&picture));
-        times.push([milliseconds(&passes, |_| true) + filtering, milliseconds(&passes, carries)]);
+        times.push([total_ms(&passes) + filtering, total_ms(passes.iter().filter(|pass| carries(pass)))]);
         if arm.carries.is_some() {
             sum = film.renderer.carriage()?;
         }

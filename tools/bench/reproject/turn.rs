@@ -1,11 +1,11 @@
 //! The experiment of Schalk 2018, 4.3: the camera turns by a total angle in steps, with so many samples for each, and rests. From then on
 //! error is measured against time.
-use crate::film::{Arm, Film, carries, milliseconds};
+use crate::film::{Arm, Film, carries};
 use crate::reference::Reference;
 use crate::{View, plot};
 use anyhow::{Result, ensure};
 use glam::{Quat, Vec3};
-use tallow::gpu::Gpu;
+use tallow::gpu::{Gpu, total_ms};
 use tallow::layout::{Camera, vec3};
 use tallow::render::{Carriage, Reproject, ReprojectOverrides};
 use tallow::report::table;
@@ -103,7 +103,7 @@ fn measure(gpu: &Gpu, args: &Args, step: f32, name: String, arm: Arm, reference:
         if k < count {
             continue;
         }
-        let ms = milliseconds(&times, |_| true);
+        let ms = total_ms(&times);
         clock += ms;
         let picture = film.picture()?.0;
         // Without carried samples a camera at rest accumulates its frames.
@@ -116,7 +116,7 @@ fn measure(gpu: &Gpu, args: &Args, step: f32, name: String, arm: Arm, reference:
         points.push((clock, reference.error(&shown)));
         if k == count && arm.carries.is_some() {
             carriage = Some(film.renderer.carriage()?);
-            carrying_ms = milliseconds(&times, carries);
+            carrying_ms = total_ms(times.iter().filter(|pass| carries(pass)));
         }
         frame_ms = ms;
     }

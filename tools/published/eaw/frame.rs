@@ -62,7 +62,7 @@ fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<Milliseconds> {
             denoiser.record(rec)
         })?;
         if i > 0 {
-            passes.iter().for_each(|pass| sums[column(pass)] += pass.duration_ns() as f64 * 1e-6 / FRAMES as f64);
+            passes.iter().for_each(|pass| sums[column(pass)] += pass.duration_ms() / FRAMES as f64);
         }
     }
     Ok(sums)

@@ -6,7 +6,7 @@ use crate::published::view::View;
 use crate::published::{Section, push};
 use tallow::denoise::filter::{self, Method};
 use tallow::denoise::{Noisy, Recipe, timed};
-use tallow::gpu::{FrameResources, Gpu, PassTime};
+use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::image::{Picture, metrics};
 use tallow::render::settings::{Settings, Split};
 use tallow::render::{Job, Outputs, Renderer};
@@ -93,7 +93,6 @@ fn one(
     let mut renderer = Renderer::new(gpu, &scene, &scene.settings, ALL)?;
     let mut frame = FrameResources::new(gpu)?;
     let recipe = Recipe::new(Method::Kernels(filter::find(filter).expect("a row of the table")));
-    let milliseconds = |passes: &[PassTime]| passes.iter().map(|pass| pass.duration_ns() as f64 * 1e-6).sum::<f64>();
     Job::new(&renderer).run_to_end(&mut frame)?; // compiles
     let (mut sums, mut last) = (Row::default(), None);
     for seed in 0..SEEDS {
@@ -104,7 +103,7 @@ fn one(
         let pixels = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
         let picture = Picture { pixels, ..reference.clone() };
         let errors = metrics::compare(&picture, reference);
-        let row = [milliseconds(&status.times), milliseconds(&clean.times), errors.relmse, errors.flip];
+        let row = [total_ms(&status.times), total_ms(&clean.times), errors.relmse, errors.flip];
         sums = std::array::from_fn(|k| sums[k] + row[k] / f64::from(SEEDS));
         last = Some(picture);
     }

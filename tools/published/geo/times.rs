@@ -4,7 +4,7 @@ use crate::published::view::View;
 use crate::published::{Section, placed, push};
 use std::collections::BTreeMap;
 use tallow::allocate::geometry;
-use tallow::gpu::{FrameResources, Gpu, PassTime};
+use tallow::gpu::{FrameResources, Gpu};
 use tallow::render::{Job, Outputs, Renderer, Step, traces_paths};
 use tallow::report::html::Table;
 
@@ -25,8 +25,7 @@ fn passes(gpu: &Gpu, renderer: &Renderer, steps: &[Step]) -> anyhow::Result<BTre
     for run in 0..=RUNS {
         let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
         for step in steps {
-            let ms = |t: &PassTime| t.duration_ns() as f64 * 1e-6;
-            renderer.run(&mut frame, step)?.iter().for_each(|t| *sums.entry(t.name).or_default() += ms(t));
+            renderer.run(&mut frame, step)?.iter().for_each(|t| *sums.entry(t.name).or_default() += t.duration_ms());
         }
         if run > 0 {
             // the first compiles
@@ -103,7 +102,7 @@ fn share(gpu: &Gpu, args: &Args) -> anyhow::Result<String> {
     let Allocation { importance, counts } = allocation(gpu, &placed)?;
     let (mut lists, mut traced) = (0.0, 0.0);
     for t in Job::new(&placed).run_to_end(&mut FrameResources::new(gpu)?)?.times {
-        let ms = t.duration_ns() as f64 * 1e-6;
+        let ms = t.duration_ms();
         lists += if t.name == "sample_list" { ms } else { 0.0 };
         traced += if traces_paths(t.name) || t.name == "accumulate" { ms } else { 0.0 };
     }
