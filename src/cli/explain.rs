@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{DeviceKind, DeviceOptions, FrameResources, Gpu, total_ms};
 use crate::layout::*;
 use crate::render::settings::{Allocate, Settings};
-use crate::render::{Job, Outputs, Renderer};
+use crate::render::{Job, Outputs, Renderer, called_for};
 use crate::report::table::{self, milliseconds};
 use crate::scene::{self, Loaded, Scene, SceneFile};
 use indicatif::ProgressBar;
@@ -161,12 +161,10 @@ impl Variant {
     }
 }
 
-/// What an EXR file of all layers calls for.
-const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
-
 /// The effects that are named, or all, without their costs.
 fn listed(named: &[String], scene: &Loaded) -> Result<Vec<EffectRow>> {
-    let (base, reasons) = scene::effects(scene, &scene.settings, OUTPUTS.split_light, OUTPUTS.counters);
+    let Outputs { split_light, counters, .. } = Outputs::FILTERED;
+    let (base, reasons) = scene::effects(scene, &scene.settings, split_light, counters);
     let reason = |effect| reasons.iter().find(|(of, _)| *of == effect).map_or("", |(_, by)| by).to_owned();
     let effects = Effect::ALL.iter().zip(base.switches()).map(|(&e, on)| (e.name(), on, reason(e)));
     let all: Vec<_> = effects.chain([(GUIDES, true, "an output that keeps primary hits".to_owned())]).collect();
@@ -184,8 +182,8 @@ fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<()> {
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
     let pixels = PIXELS_BY_KIND[usize::from(gpu.info().kind != DeviceKind::Cpu)];
     let scene = scene.with(|settings| shrink(settings, pixels));
-    let (base, _) = scene::effects(&scene, &scene.settings, OUTPUTS.split_light, OUTPUTS.counters);
-    let usual = || Variant::new(args, &scene, OUTPUTS, base);
+    let base = called_for(&scene, &scene.settings, Outputs::FILTERED);
+    let usual = || Variant::new(args, &scene, Outputs::FILTERED, base);
     let first = usual()?.cost.compile_ms;
     let mut usual = usual()?;
     usual.cost.compile_ms = usual.cost.compile_ms.min(first);

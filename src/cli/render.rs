@@ -119,7 +119,7 @@ impl Args {
         let layers = self.denoise.is_some()
             || self.checkpoint.is_some()
             || self.output_files().iter().any(|file| image::has_layers(file));
-        Outputs { split_light: layers, guides: layers, counters: self.counters }
+        Outputs { counters: self.counters, ..Outputs::for_filter(layers) }
     }
 }
 

@@ -175,8 +175,7 @@ fn out_of_reach(target: Target, forecasts: &[Forecast]) -> Error {
 
 /// What a render without a filter needs, and one with.
 pub(crate) fn outputs(methods: &[Method]) -> Outputs {
-    let layers = methods.iter().any(|method| method.name() != "none");
-    Outputs { split_light: layers, guides: layers, counters: false }
+    Outputs::for_filter(methods.iter().any(|method| method.name() != "none"))
 }
 
 impl Plan {

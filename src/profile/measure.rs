@@ -60,8 +60,7 @@ pub fn measure(
         let name = &gpu.info().name;
         return Err(Error::Device(format!("{name} has no timestamps: choose another device to profile on")));
     }
-    let layers = filter.is_some();
-    let outputs = Outputs { split_light: layers, guides: layers, counters: false };
+    let outputs = Outputs::for_filter(filter.is_some());
     let counters = count_rays(gpu, scene, settings, Outputs { counters: true, ..outputs })?;
     let ceilings = Ceilings::measure(gpu)?;
     let renderer = Renderer::new(gpu, scene, settings, outputs)?;

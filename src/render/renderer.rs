@@ -27,6 +27,16 @@ pub struct Outputs {
     pub counters: bool,
 }
 
+impl Outputs {
+    /// All that filters read, and nothing more.
+    pub const FILTERED: Self = Self { split_light: true, guides: true, counters: false };
+
+    /// [`Self::FILTERED`] if a filter follows, and the fewest otherwise.
+    pub fn for_filter(follows: bool) -> Self {
+        if follows { Self::FILTERED } else { Self::default() }
+    }
+}
+
 /// A scene on a device and the kernels to render it. Everything is created in [`Renderer::new`], nothing later.
 pub struct Renderer {
     pub(super) gpu: Gpu,

@@ -74,7 +74,7 @@ fn an_engine_gets_the_bits_of_the_command_line_frame_after_frame() {
 
 fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
     let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, policy))).unwrap();
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let outputs = Outputs::FILTERED;
     let mut renderer = Renderer::new(gpu, &scene, &scene.settings, outputs).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
     let pixels = (WIDTH * HEIGHT) as usize;
@@ -144,9 +144,7 @@ fn an_engine_gets_every_layer() {
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
     let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, "uniform"))).unwrap();
-    let renderer =
-        Renderer::new(&gpu, &scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false })
-            .unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let pixels = (WIDTH * HEIGHT) as usize;
     let vectors = Buffer::<vec3>::new(&gpu, "vectors", pixels, Location::Readback).unwrap();
@@ -196,8 +194,7 @@ fn an_engine_filters_its_frames_where_they_are() {
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
     let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, "uniform"))).unwrap();
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
     let film = command_line("uniform");
     let aovs = Aovs::find(&film, &Names::new()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();

@@ -11,8 +11,6 @@ use tallow::render::settings::Settings;
 use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, StopReason, merge, traces_paths};
 use tallow::scene::{Loaded, Scene};
 
-const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
-
 fn scene(change: impl Fn(&mut Settings)) -> Loaded {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
     let small = |s: &mut Settings| {
@@ -57,7 +55,7 @@ fn an_engine_renders_to_a_threshold_and_resumes_where_it_was_interrupted() {
     let file = |name: &str| folder.path().join(name);
     for (policy, spread) in [("to a threshold", false), ("evenly", true)] {
         let scene = scene(|s| if spread { s.spp = 4 } else { to_a_threshold(s) });
-        let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
+        let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
         // Short steps, so that there are some to stop between.
         let job = Job { paths_at_once: 300, ..Job::new(&renderer) };
         let whole = run(&gpu, &job, &file("whole.exr"), u64::MAX);
@@ -96,7 +94,7 @@ fn steps_of_a_given_time_change_no_bit() {
                 to_a_threshold(s);
             }
         });
-        let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
+        let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
         let rendered = |step_time: Option<Duration>| {
             let job = Job { step_time, ..Job::new(&renderer) };
             let status = run(&gpu, &job, &file, u64::MAX);
@@ -116,7 +114,7 @@ fn an_engine_merges_what_it_rendered_by_two_seeds() {
     let file = |name: &str| folder.path().join(name);
     for (name, seed, first) in [("a.exr", 0, 0), ("b.exr", 1, 0), ("c.exr", 1, 8)] {
         let scene = scene(|s| (s.spp, s.seed, s.first_sample) = (4, seed, first));
-        let renderer = Renderer::new(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
         run(&gpu, &Job::new(&renderer), &file(name), u64::MAX);
     }
     let merged = merge(&["a.exr", "b.exr", "c.exr"].map(file)).unwrap();
@@ -143,7 +141,7 @@ fn a_film_of_a_moved_camera_cannot_be_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("moved.exr");
     let scene = scene(|s| s.spp = 2);
-    let mut renderer = Renderer::resumable(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
+    let mut renderer = Renderer::resumable(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
     run(&gpu, &Job::new(&renderer), &file, u64::MAX);
     Checkpoint::read(&file, &scene, &scene.settings).unwrap();
     renderer.set_camera(Camera { position: [0.1, 0.2, 0.3], ..scene.camera([33, 17]).unwrap() }).unwrap();

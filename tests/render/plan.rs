@@ -10,8 +10,6 @@ use tallow::plan::{Target, plan};
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
 
-const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
-
 fn scene(file: &str, policy: &str, spp: u32, seed: u32) -> Loaded {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
     let small = |s: &mut tallow::render::settings::Settings| {
@@ -22,7 +20,7 @@ fn scene(file: &str, policy: &str, spp: u32, seed: u32) -> Loaded {
 }
 
 fn rendered(gpu: &Gpu, scene: &Loaded, filter: Option<Method>) -> Picture {
-    let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
+    let renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::FILTERED).unwrap();
     support::render(gpu, &renderer);
     let Some(method) = filter else { return renderer.picture().unwrap() };
     let noisy = Noisy::of_film(&renderer).unwrap();
@@ -77,7 +75,7 @@ fn told_errors_are_near_true_ones() {
     for (file, spp) in [("cornell-box/scene.toml", 4), ("cornell-box/glossy.toml", 16), ("veach-mis/scene.toml", 16)] {
         let reference = rendered(&gpu, &scene(file, "uniform", 512, 1000), None);
         let noisy = scene(file, "uniform", spp, 3);
-        let renderer = Renderer::new(&gpu, &noisy, &noisy.settings, OUTPUTS).unwrap();
+        let renderer = Renderer::new(&gpu, &noisy, &noisy.settings, Outputs::FILTERED).unwrap();
         support::render(&gpu, &renderer);
         let clean = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &Recipe::new(method));
         let told = clean.unwrap().join(&gpu).unwrap().expected.unwrap();

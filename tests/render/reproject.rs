@@ -31,8 +31,7 @@ fn a_camera_at_rest_accumulates_to_the_bit() {
     let files = ["cornell-box/scene.toml", "cornell-box/glass.toml", "veach-mis/scene.toml"];
     for (file, reproject) in files.into_iter().flat_map(|file| WAYS.map(|way| (file, way))) {
         let whole = scene(file, |s| (small(s), s.spp = 12).0);
-        let outputs = Outputs { split_light: true, guides: true, counters: false };
-        let renderer = Renderer::new(&gpu, &whole, &whole.settings, outputs).unwrap();
+        let renderer = Renderer::new(&gpu, &whole, &whole.settings, Outputs::FILTERED).unwrap();
         let expected = support::render(&gpu, &renderer);
         let light = renderer.film().tiles[0].light.read().unwrap();
 

@@ -10,8 +10,6 @@ use tallow::render::settings::{Settings, Split};
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
 
-const ALL: Outputs = Outputs { split_light: true, guides: true, counters: false };
-
 /// A sphere on a floor below a sky, a lamp and a point light.
 fn scene(change: impl Fn(&mut Settings)) -> Loaded {
     let text = "[camera]\nposition = [0.0, 2.0, 5.0]\ntarget = [0.0, 0.5, 0.0]\nfov = 45.0\n[film]\nwidth = 33\nheight = 18\n\
@@ -28,7 +26,7 @@ fn scene(change: impl Fn(&mut Settings)) -> Loaded {
 
 /// The statistics that are left, and the rays that were traced.
 fn rendered(gpu: &Gpu, scene: &Loaded, paths_at_once: u32) -> (Vec<PixelStats>, Vec<PixelLight>, u64) {
-    let outputs = Outputs { counters: true, ..ALL };
+    let outputs = Outputs { counters: true, ..Outputs::FILTERED };
     let renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
     let job = Job { paths_at_once, ..Job::new(&renderer) };
     job.run_to_end(&mut tallow::gpu::FrameResources::new(gpu).unwrap()).unwrap();
@@ -96,7 +94,7 @@ fn filters_fill_in_what_is_not_traced() {
     let gpu = gpu();
     let picture = |stride: u32, spp: u32, filter: &str| -> Vec<vec3> {
         let scene = scene(|s| (s.indirect_stride, s.spp, s.max_depth) = (stride, spp, 3));
-        let renderer = Renderer::new(&gpu, &scene, &scene.settings, ALL).unwrap();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
         support::render(&gpu, &renderer);
         let method = Method::Kernels(find(filter).unwrap());
         let clean = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &Recipe::new(method)).unwrap();
@@ -131,13 +129,13 @@ fn what_needs_the_light_of_every_pixel_is_refused() {
         let noisy = Noisy::of_film(&renderer);
         noisy.and_then(|noisy| Filtered::new(&gpu, noisy, &Recipe::new(method))).map(drop).unwrap_err().to_string()
     };
-    let told = refused(ALL, Method::Oidn);
+    let told = refused(Outputs::FILTERED, Method::Oidn);
     assert!(told.contains("oidn") && told.contains("indirect_stride 2"), "{told}");
-    let told = refused(Outputs { split_light: false, ..ALL }, Method::Kernels(find("atrous").unwrap()));
+    let told = refused(Outputs { split_light: false, ..Outputs::FILTERED }, Method::Kernels(find("atrous").unwrap()));
     assert!(told.contains("split_light"), "{told}");
     let told = tallow::render::can_carry(&gpu, &scene, &scene.settings).unwrap_err().to_string();
     assert!(told.contains("indirect_stride"), "{told}");
-    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, ALL).unwrap();
+    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
     let told = renderer.keep_history(Default::default(), tallow::render::Moves::Camera).unwrap_err().to_string();
     assert!(told.contains("set indirect_stride to 1"), "{told}");
 }

@@ -56,11 +56,10 @@ fn the_sequence_of_samples_goes_on_from_its_start_behind_its_end() {
 #[test]
 fn a_film_of_one_pixel_has_the_layers_of_any_other() {
     let gpu = support::gpu();
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
     for file in ["cornell-box/scene.toml", "cornell-box/glass.toml"] {
         let layers = [1, 2].map(|width| {
             let scene = scene(file, |s| (s.width, s.height, s.spp) = (width, 1, 1));
-            let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+            let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
             let job = Job::new(&renderer);
             let status = job.run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
             let film = job.film(&status).unwrap();
@@ -136,7 +135,7 @@ fn culprits(gpu: &Gpu, scene: &Loaded, expected: &[PixelStats]) -> String {
 
 /// What is called for, and all effects.
 fn plain_and_all(gpu: &Gpu, scene: &Loaded) -> [Renderer; 2] {
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let outputs = Outputs::FILTERED;
     let all = Renderer::specialised(gpu, scene, &scene.settings, outputs, render::all_effects(scene, &scene.settings));
     [Renderer::new(gpu, scene, &scene.settings, outputs).unwrap(), all.unwrap()]
 }
@@ -370,8 +369,7 @@ fn black_floor(coated: bool) -> Loaded {
 
 /// Renders, and returns radiance, light and guides.
 fn apart(gpu: &Gpu, scene: &Loaded) -> (Vec<PixelStats>, Vec<PixelLight>, Vec<Guide>) {
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
+    let renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::FILTERED).unwrap();
     let stats = support::render(gpu, &renderer);
     let tile = &renderer.film().tiles[0];
     (stats, tile.light.read().unwrap(), tile.guide.read().unwrap())
@@ -472,8 +470,7 @@ fn samples_that_are_no_numbers_are_black_and_told() {
     for policy in ["uniform", "variance", "both"] {
         let scene =
             too_bright(|s| (s.allocate.policy, s.first_sample) = (tallow::allocate::policy(policy).unwrap(), 10));
-        let outputs = Outputs { split_light: true, guides: true, counters: false };
-        let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         Job::new(&renderer).run_to_end(&mut frame).unwrap();
         let (stats, broken) = (support::stats(&renderer), renderer.broken_samples().unwrap().unwrap());

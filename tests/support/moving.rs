@@ -50,8 +50,7 @@ impl Film {
     }
 
     fn following(gpu: &Gpu, scene: &Loaded, settings: Reproject, moves: Moves) -> Self {
-        let outputs = Outputs { split_light: true, guides: true, counters: false };
-        let mut renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
+        let mut renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::FILTERED).unwrap();
         renderer.keep_history(settings, moves).unwrap();
         let camera = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
         Self { gpu: gpu.clone(), renderer, frame: FrameResources::new(gpu).unwrap(), camera, begun: false }

@@ -21,8 +21,6 @@ use tallow::statistics::{Pixel, variance_of_mean};
 const SIZES: [[u32; 2]; 6] = [[1, 1], [31, 1], [1, 65], [64, 2], [65, 3], LARGEST];
 const LARGEST: [u32; 2] = [33, 17];
 const DEMODULATIONS: [Demodulation; 3] = [Demodulation::Light, Demodulation::Albedo, Demodulation::Off];
-const ALL: Outputs = Outputs { split_light: true, guides: true, counters: false };
-
 /// Buffers that a renderer leaves.
 struct Frame {
     size: [u32; 2],
@@ -179,7 +177,7 @@ fn frames_are_taken_apart_and_put_together_as_their_twins() {
         // Where samples are placed, pixels may have none.
         let policies = if size == LARGEST { &["uniform", "geometry"][..] } else { &["geometry"] };
         for &policy in policies {
-            let renderer = renderer(&gpu, size, ALL, policy);
+            let renderer = renderer(&gpu, size, Outputs::FILTERED, policy);
             let frames = [Frame::new(size, false), Frame::new(size, true), Frame::new(size, true).sparse()];
             for frame in &frames {
                 let of = |filter, demodulation| {
@@ -208,7 +206,7 @@ fn sparse_frames_are_filled_in_as_by_their_twins() {
     let gpu = gpu();
     let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
     for size in SIZES {
-        let renderer = renderer_of(&gpu, size, ALL, "uniform", 3);
+        let renderer = renderer_of(&gpu, size, Outputs::FILTERED, "uniform", 3);
         for (frame, filter) in [(Frame::new(size, false), "svgf"), (Frame::new(size, true), "none")] {
             let device = frame.on_the_device(&gpu, &renderer, filter, &settings, Demodulation::Light);
             let host = |stride| frame.on_the_host(filter, &settings, Demodulation::Light, false, stride);
@@ -281,7 +279,7 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
 fn a_film_and_its_file_become_one_picture() {
     let gpu = gpu();
     for frame in [Frame::new([65, 3], true), Frame::new([65, 3], true).sparse()] {
-        let renderer = renderer(&gpu, [65, 3], ALL, "geometry");
+        let renderer = renderer(&gpu, [65, 3], Outputs::FILTERED, "geometry");
         frame.upload(&renderer);
         let film = frame.film();
         let aovs = Aovs::find(&film, &Names::new()).unwrap();
@@ -312,7 +310,7 @@ fn expected_errors_agree_with_their_twin() {
     let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
     for (size, demodulation) in [([31, 1], Demodulation::Albedo), (LARGEST, Demodulation::Light)] {
         let frame = Frame::new(size, false);
-        let renderer = renderer(&gpu, size, ALL, "uniform");
+        let renderer = renderer(&gpu, size, Outputs::FILTERED, "uniform");
         frame.upload(&renderer);
         let (method, fireflies) = (auto.into(), Fireflies::Off);
         let recipe = Recipe { method, demodulation: Some(demodulation), fireflies, settings: &|_| settings };
@@ -365,13 +363,16 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
     };
     let has =
         |error: Option<String>, word: &str| assert!(error.as_ref().is_some_and(|e| e.contains(word)), "{error:?}");
-    has(refused(Outputs { guides: false, ..ALL }, "uniform", Demodulation::Off), "Outputs::guides");
-    has(refused(Outputs { split_light: false, ..ALL }, "uniform", Demodulation::Light), "Outputs::split_light");
-    assert_eq!(refused(ALL, "geometry", Demodulation::Light), None);
+    has(refused(Outputs { guides: false, ..Outputs::FILTERED }, "uniform", Demodulation::Off), "Outputs::guides");
+    has(
+        refused(Outputs { split_light: false, ..Outputs::FILTERED }, "uniform", Demodulation::Light),
+        "Outputs::split_light",
+    );
+    assert_eq!(refused(Outputs::FILTERED, "geometry", Demodulation::Light), None);
     for demodulation in [Demodulation::Albedo, Demodulation::Off] {
-        assert_eq!(refused(Outputs { split_light: false, ..ALL }, "geometry", demodulation), None);
+        assert_eq!(refused(Outputs { split_light: false, ..Outputs::FILTERED }, "geometry", demodulation), None);
     }
-    let renderer = renderer(&gpu, [8, 8], ALL, "uniform");
+    let renderer = renderer(&gpu, [8, 8], Outputs::FILTERED, "uniform");
     let wrong = FilterSettings::default().with(|s| s.edge.extent = -1.0);
     has(
         Denoiser::new(&gpu, &renderer, find("atrous").unwrap(), &wrong, Demodulation::Light)

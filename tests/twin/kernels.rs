@@ -145,8 +145,7 @@ pub fn twin_samples(scene: &Loaded, effects: Effects) -> (Vec<Vec3>, u32) {
 }
 
 pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::specialised(gpu, scene, &scene.settings, outputs, effects).unwrap();
+    let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::FILTERED, effects).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
     let pixels = SIDE * SIDE;
     let batch = Batch { first_pixel: 0, pixels, first_sample: 0, samples: SAMPLES };
@@ -233,7 +232,7 @@ pub fn check(name: &str, pair: &Pair) {
 #[test]
 fn renders_agree_with_their_twins() {
     let gpu = gpu();
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let outputs = Outputs::FILTERED;
     for file in SCENES {
         let scene = shipped(file);
         check(file, &run(&gpu, &scene, called_for(&scene, &scene.settings, outputs)));
@@ -279,11 +278,10 @@ fn renders_agree_with_their_twins() {
 #[test]
 fn renders_of_mirrored_lamps_agree_with_their_twins() {
     let gpu = gpu();
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
     for [material, mesh] in PATTERNS {
         let mut lamp = patterned_lamp(material, &format!("{mesh}\n{}", MIRRORS[0]));
         small(&mut lamp.settings);
-        check(material, &run(&gpu, &lamp, called_for(&lamp, &lamp.settings, outputs)));
+        check(material, &run(&gpu, &lamp, called_for(&lamp, &lamp.settings, Outputs::FILTERED)));
     }
     assert_silent(&gpu);
 }
@@ -589,7 +587,7 @@ fn the_unit_of_length_does_not_matter() {
     let gpu = gpu();
     let samples = |scale: f64| {
         let scene = scaled(scale);
-        let effects = called_for(&scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false });
+        let effects = called_for(&scene, &scene.settings, Outputs::FILTERED);
         run(&gpu, &scene, effects).samples
     };
     let [device, twin] = samples(1.0);

@@ -165,8 +165,7 @@ fn scene() -> Loaded {
 #[test]
 fn materials_of_gltf_agree_with_their_twins() {
     let (gpu, scene) = (gpu(), scene());
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let effects = called_for(&scene, &scene.settings, outputs);
+    let effects = called_for(&scene, &scene.settings, Outputs::FILTERED);
     let Effects { texture_modes, second_uv, vertex_colors, tangents, alpha_cutoff, .. } = effects;
     assert_eq!([texture_modes, second_uv, vertex_colors, tangents, alpha_cutoff], [true; 5]);
     assert_eq!([effects.metallic, effects.clearcoat, effects.thin_walls], [true; 3]);
@@ -377,7 +376,7 @@ fn an_orthographic_camera_agrees_with_its_twin() {
         scene
     };
     let scene = view(Some(4.4));
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let outputs = Outputs::FILTERED;
     let effects = called_for(&scene, &scene.settings, outputs);
     assert!(effects.orthographic && !called_for(&view(None), &scene.settings, outputs).orthographic);
     let pair = run(&gpu, &scene, effects);
@@ -417,8 +416,7 @@ fn pictures_of_floats_agree_with_their_twins() {
     let mut scene = Scene::build(&description).unwrap();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     small(&mut scene.settings);
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let effects = called_for(&scene, &scene.settings, outputs);
+    let effects = called_for(&scene, &scene.settings, Outputs::FILTERED);
     assert!(effects.hdr_textures);
     let pair = run(&gpu, &scene, effects);
     check("floats", &pair);

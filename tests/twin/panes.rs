@@ -36,9 +36,8 @@ pub fn panes() -> Loaded {
 #[test]
 fn panes_agree_with_their_twin() {
     let gpu = support::gpu();
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
     let scene = panes();
-    let effects = called_for(&scene, &scene.settings, outputs);
+    let effects = called_for(&scene, &scene.settings, Outputs::FILTERED);
     assert!(effects.clear_walls && effects.alpha_masks);
     check("panes", &run(&gpu, &scene, effects));
     check("panes, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));

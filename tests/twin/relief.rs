@@ -51,7 +51,7 @@ fn kernels_agree_about_relief_that_is_turned() {
     let mut loaded =
         Loaded { scene: one(material(30.0, [-2.0, 0.5]), mesh, Transform::default(), false), ..Loaded::default() };
     small(&mut loaded.settings);
-    let effects = called_for(&loaded, &loaded.settings, Outputs { split_light: true, guides: true, counters: false });
+    let effects = called_for(&loaded, &loaded.settings, Outputs::FILTERED);
     check("turned relief", &run(&gpu, &loaded, effects));
     assert_silent(&gpu);
 }

@@ -42,9 +42,7 @@ struct Args {
 /// GPU milliseconds and image of a planned render, as the command line makes it.
 fn rendered(gpu: &Gpu, scene: &Loaded, plan: &Plan) -> Result<(f64, Picture)> {
     let method = plan.method()?;
-    let layers = method.is_some();
-    let outputs = Outputs { split_light: layers, guides: layers, counters: false };
-    let renderer = Renderer::new(gpu, scene, &plan.settings, outputs)?;
+    let renderer = Renderer::new(gpu, scene, &plan.settings, Outputs::for_filter(method.is_some()))?;
     let mut times = Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?.times;
     let mut picture = renderer.picture()?;
     if let Some(method) = method {

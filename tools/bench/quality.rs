@@ -22,8 +22,7 @@ fn render(
 ) -> Result<(Vec<Guide>, Vec<PixelStats>, Vec<PixelLight>)> {
     let settings = |s: &mut Settings| (s.width, s.height, s.spp, s.seed, s.max_depth) = (side, side, spp, seed, 4);
     let scene = Scene::load(Path::new(file)).map(|scene| scene.with(settings))?;
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::new(gpu, &scene, &scene.settings, outputs)?;
+    let renderer = Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED)?;
     Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?;
     let tile = renderer.film().tiles.first().context("a film has a tile")?;
     Ok((tile.guide.read()?, tile.stats.read()?, tile.light.read()?))

@@ -118,8 +118,7 @@ fn paths(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
 fn placing(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
     let mut settings = scene.settings.clone();
     settings.allocate.policy = tallow::allocate::policy("both").context("no such policy")?;
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::new(gpu, scene, &settings, outputs)?;
+    let renderer = Renderer::new(gpu, scene, &settings, Outputs::FILTERED)?;
     let mut frame = FrameResources::new(gpu)?;
     Ok(Box::new(move || {
         let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
@@ -128,8 +127,7 @@ fn placing(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
 }
 
 fn filter(gpu: &Gpu, scene: &Loaded, name: &str) -> Result<Run> {
-    let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::new(gpu, scene, &scene.settings, outputs)?;
+    let renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::FILTERED)?;
     let mut frame = FrameResources::new(gpu)?;
     Job::new(&renderer).run_to_end(&mut frame)?;
     let row = FILTERS.iter().find(|row| row.name == name).context("no such filter")?;

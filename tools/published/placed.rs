@@ -56,8 +56,7 @@ const ONE_OF_EACH: [fn(&Step) -> bool; 5] = [
 
 /// Renders a scene with its settings. Each kernel runs once before that without being timed, because drivers compile then.
 pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
-    let renderer =
-        Renderer::new(gpu, scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false })?;
+    let renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::FILTERED)?;
     let mut frame = FrameResources::new(gpu)?;
     for kind in ONE_OF_EACH {
         renderer.steps().find(kind).map_or(Ok(Vec::new()), |step| renderer.run(&mut frame, &step))?;

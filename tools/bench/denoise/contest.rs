@@ -81,7 +81,7 @@ fn images(
     settings: &Settings,
     contenders: &[Contender],
 ) -> Result<(Picture, Vec<Image>)> {
-    let renderer = Renderer::new(gpu, scene, settings, Outputs { guides: true, split_light: true, counters: false })?;
+    let renderer = Renderer::new(gpu, scene, settings, Outputs::FILTERED)?;
     let job = Job::new(&renderer);
     let status = job.run_to_end(&mut FrameResources::new(gpu)?)?;
     let noisy = job.film(&status)?.picture(None).map_err(|what| anyhow!(what))?;

@@ -27,8 +27,7 @@ impl Reference {
         if !file.exists() {
             eprintln!("rendering {} with {} samples per pixel", file.display(), settings.spp);
             let settings = view.settings(settings, settings.spp, SEED);
-            let renderer =
-                Renderer::new(gpu, scene, &settings, Outputs { guides: true, split_light: true, counters: false })?;
+            let renderer = Renderer::new(gpu, scene, &settings, Outputs::FILTERED)?;
             let job = Job::new(&renderer);
             let status = job.run_to_end(&mut FrameResources::new(gpu)?)?;
             image::write(file, &job.film(&status)?, &WriteOptions::default())?;

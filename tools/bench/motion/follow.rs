@@ -166,7 +166,7 @@ fn ratios(of: &[f64], to: &[f64]) -> String {
 
 /// The noisy picture, its film, and what the guided filter makes of it.
 fn picture(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<(Picture, Film, Picture)> {
-    let renderer = Renderer::new(gpu, scene, settings, Outputs { guides: true, split_light: true, counters: false })?;
+    let renderer = Renderer::new(gpu, scene, settings, Outputs::FILTERED)?;
     let job = Job::new(&renderer);
     let status = job.run_to_end(&mut FrameResources::new(gpu)?)?;
     let film = job.film(&status)?;

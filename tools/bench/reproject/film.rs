@@ -41,8 +41,7 @@ impl Film {
             s.allocate.policy = policy(arm.policy).unwrap_or(s.allocate.policy);
             s.allocate.min_spp = 2.min(s.spp); // of one sample, no noise is known
         });
-        let outputs = Outputs { split_light: true, guides: true, counters: false };
-        let mut renderer = Renderer::new(gpu, &scene, &scene.settings, outputs)?;
+        let mut renderer = Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED)?;
         let moves = if scene.animation.is_empty() { Moves::Camera } else { Moves::Scene };
         arm.carries.map_or(Ok(()), |settings| renderer.keep_history(settings, moves))?;
         Ok(Self { renderer, gpu: gpu.clone(), frame: FrameResources::new(gpu)?, arm })

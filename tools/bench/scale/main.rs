@@ -105,8 +105,7 @@ fn one(what: &str, size: &str) -> Result<Measured> {
     };
     let loaded = begun.elapsed();
     let (gpu, begun) = (Gpu::open(&DeviceOptions::default())?, Instant::now());
-    let outputs = Outputs { guides: true, split_light: true, counters: false };
-    let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs)?;
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED)?;
     let uploaded = begun.elapsed();
     frame(&gpu, &renderer)?;
     let seconds = [loaded, uploaded, begun.elapsed() - uploaded].map(|time| time.as_secs_f64());

@@ -50,8 +50,7 @@ pub fn measure(gpu: &Gpu, args: &Args) -> anyhow::Result<Section> {
 
 fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<Milliseconds> {
     let scene = view.load(args, |s| ([s.width, s.height], s.spp) = (SIZE, 1))?;
-    let outputs = Outputs { guides: true, split_light: true, counters: false };
-    let renderer = Renderer::new(gpu, &scene, &scene.settings, outputs)?;
+    let renderer = Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED)?;
     let row = filter::find("atrous").expect("a row of the table");
     let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light)?;
     let mut frame = FrameResources::new(gpu)?;

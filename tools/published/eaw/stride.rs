@@ -14,8 +14,6 @@ use tallow::report::html::Table;
 
 /// Seeds that times and errors are means of.
 const SEEDS: u32 = 4;
-const ALL: Outputs = Outputs { guides: true, split_light: true, counters: false };
-
 /// How the samples lie: a policy, how many a pixel, and the stride.
 const WAYS: [(&str, u32, u32); 9] = [
     ("uniform", 1, 1),
@@ -90,7 +88,7 @@ fn one(
         s.allocate.min_spp = 1; // of two samples one is placed
     };
     let scene = view.load(args, change)?;
-    let mut renderer = Renderer::new(gpu, &scene, &scene.settings, ALL)?;
+    let mut renderer = Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED)?;
     let mut frame = FrameResources::new(gpu)?;
     let recipe = Recipe::new(Method::Kernels(filter::find(filter).expect("a row of the table")));
     Job::new(&renderer).run_to_end(&mut frame)?; // compiles

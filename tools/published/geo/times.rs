@@ -75,7 +75,7 @@ fn renderer(gpu: &Gpu, args: &Args, window: u32, spp: u32) -> anyhow::Result<Ren
         (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.rounds) = (spp, &geometry::ROW, 1, 1);
         s.allocate.geometry.window = window;
     })?;
-    Ok(Renderer::new(gpu, &scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false })?)
+    Ok(Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED)?)
 }
 
 fn allocation(gpu: &Gpu, renderer: &Renderer) -> anyhow::Result<Allocation> {
