@@ -10,9 +10,9 @@ mod words;
 use super::files::check_distinct;
 use super::{Exit, check_png, complain, finite, print, print_json, readable};
 use crate::error::{Error, Result};
-use crate::image::difference::{WIDER, heat_map};
+use crate::image::difference::heat_map;
 use crate::image::metrics::{self, Metrics};
-use crate::image::{self, Film, Picture, WriteOptions};
+use crate::image::{self, Picture};
 use crate::report::table;
 use serde_json::json;
 use statistical::from_0;
@@ -122,13 +122,7 @@ pub fn load(path: &Path, layer: Option<&str>, remedy: &str) -> Result<Picture> {
     };
     let picture = picture.map_err(|what| Error::input(path, what))?;
     drop(film);
-    match picture.non_finite() {
-        0 => Ok(picture),
-        n => Err(Error::input(
-            path,
-            format!("{n} of {} pixels are NaN or infinite, which no metric can weigh", picture.pixels.len()),
-        )),
-    }
+    picture.finite().map_err(|what| Error::input(path, what))
 }
 
 /// Checks that two pictures have the same size.
@@ -181,9 +175,7 @@ impl Limits {
 /// Writes the heat map and returns the value at the top of its colour scale.
 fn write_diff(path: &Path, a: &Picture, b: &Picture) -> Result<f32> {
     let (map, top) = heat_map(a, b);
-    let mut film = Film::new(a.width + WIDER, a.height);
-    film.add_vec3("", ["R", "G", "B"], &map.pixels);
-    image::write(path, &film, &WriteOptions::default())?;
+    report::write_png(path, &map)?;
     Ok(top)
 }
 

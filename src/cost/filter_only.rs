@@ -6,13 +6,13 @@ use super::machine;
 use super::plan::{Watch, device, text, values};
 use super::reference::Reference;
 use super::rounds::{Measured, Measuring, Outcome, Runs};
-use super::session::{add_filter, check_clock, finite, interleaved};
+use super::session::add_filter;
 use crate::denoise::filter::{self, FilterSettings};
 use crate::denoise::{Recipe, file, timed};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::image::aov::{Aovs, Names};
-use crate::image::{Film, Samples};
+use crate::image::{Film, Picture, Samples};
 use crate::scene::Fingerprint;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -93,7 +93,7 @@ pub fn measure_filters(
     watch: &Watch,
 ) -> Result<(Document, Images, Ended)> {
     let begun = Instant::now();
-    check_clock(gpu)?;
+    gpu.check_clock()?;
     let aovs = Aovs::find(plan.film, &Names::new()).map_err(|what| Error::input(plan.path, what))?;
     let earlier = earlier.map(|document| document.points).unwrap_or_default();
     let point = |candidate: &FilterCandidate| taken_up(&earlier, method(candidate), candidate.command.clone());
@@ -155,7 +155,8 @@ impl Filters<'_> {
             errors: Default::default(),
         };
         let warm_up = add_filter(&mut run, &WarmUp { compile_ms: 0.0, first_run_ms: 0.0 }, &filtered);
-        let picture = finite(interleaved([self.plan.film.width, self.plan.film.height], &filtered.colour))?;
+        let size = [self.plan.film.width, self.plan.film.height];
+        let picture = Picture::of_planes(size, &filtered.colour).finite().map_err(Error::Device)?;
         Ok(Measured { point, run, picture, warm_up, device_bytes: filtered.device_bytes })
     }
 }

@@ -2,7 +2,6 @@
 use super::document::{Method, Point, Run};
 use super::judge::judge;
 use super::reference::Reference;
-use super::session::finite;
 use crate::error::{Error, Result};
 use crate::image::{self, Picture, input};
 use serde::Deserialize;
@@ -87,7 +86,7 @@ fn one(run: &OtherRun, reference: &Reference) -> Result<(Run, Picture)> {
         let what = format!("is {}x{}, but {}x{} is measured", size[0], size[1], wanted[0], wanted[1]);
         return Err(Error::input(&run.image, what));
     }
-    let picture = finite(picture)?;
+    let picture = picture.finite().map_err(|what| Error::input(&run.image, what))?;
     let judged = Run {
         seed: run.seed,
         gpu_ms: run.ms,
@@ -102,7 +101,11 @@ fn one(run: &OtherRun, reference: &Reference) -> Result<(Run, Picture)> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::reference;
     use super::*;
+    use crate::image::{Film, WriteOptions};
+
+    const TABLE: &str = "method,filter,spp,seed,ms,image\nOther,none,4,7,12.5,a/b.exr\nOther,oidn,4,7,20,c.exr\n";
 
     fn table(text: &str) -> Result<Vec<OtherRun>> {
         let folder = tempfile::tempdir().unwrap();
@@ -115,11 +118,26 @@ mod tests {
 
     #[test]
     fn a_table_names_images_and_times() {
-        let runs =
-            table("method,filter,spp,seed,ms,image\nOther,none,4,7,12.5,a/b.exr\nOther,oidn,4,7,20,c.exr\n").unwrap();
+        let runs = table(TABLE).unwrap();
         let labels: Vec<_> = runs.iter().map(|run| run.method.label()).collect();
         assert_eq!(labels, ["Other, 4 spp", "Other + oidn, 4 spp"]);
         assert_eq!((runs[0].seed, runs[0].ms, &runs[0].image), (7, 12.5, &PathBuf::from("a/b.exr")));
+    }
+
+    #[test]
+    fn an_image_of_no_numbers_fails_by_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let [good, bad] = [("good.exr", 1.0), ("bad.exr", f32::NAN)].map(|(name, value)| {
+            let path = folder.path().join(name);
+            let picture = Picture { width: 1, height: 1, pixels: vec![[value; 3]] };
+            image::write(&path, &Film::from(&picture), &WriteOptions::default()).unwrap();
+            path
+        });
+        let reference = reference::read(&good, [1, 1], None).unwrap();
+        let run = |image| OtherRun { image, ..table(TABLE).unwrap().remove(0) };
+        assert!(one(&run(good), &reference).is_ok());
+        let line = one(&run(bad), &reference).unwrap_err().to_string();
+        assert!(line.contains("bad.exr") && line.contains("1 of 1 pixels"), "{line}");
     }
 
     #[test]

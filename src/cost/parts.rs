@@ -65,8 +65,7 @@ impl Parts {
     pub fn store(&self, file: &Path) -> Result<()> {
         let folder = file.parent().unwrap_or(Path::new("."));
         std::fs::create_dir_all(folder).map_err(|e| Error::output(folder, e))?;
-        let mut film = Film::new(self.size[0], self.size[1]);
-        film.add_vec3("", ["R", "G", "B"], &self.picture().pixels);
+        let mut film = Film::from(&self.picture());
         film.add_vec3("variance", ["R", "G", "B"], &self.variance());
         film.metadata.insert(PARTS.to_owned(), self.count.to_string());
         image::write(file, &film, &WriteOptions::default())?;

@@ -35,10 +35,7 @@ pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings)>) -> 
         );
         return Err(wrong(what));
     }
-    let picture = film.picture(None).map_err(wrong)?;
-    if picture.non_finite() > 0 {
-        return Err(wrong(format!("{} pixels are NaN or infinite, which no metric can weigh", picture.non_finite())));
-    }
+    let picture = film.picture(None).and_then(Picture::finite).map_err(wrong)?;
     let provenance = Provenance::of(&film).ok();
     let mut notes = Vec::new();
     if let (Some(provenance), Some((scene, settings))) = (&provenance, shows) {

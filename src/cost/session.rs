@@ -3,7 +3,7 @@ use super::document::{Pass, Run, WarmUp};
 use super::grid::{Candidate, Shot};
 use super::motion::{Motion, Moving};
 use super::rounds::{Measured, Outcome, Runs};
-use crate::denoise::{Colour, Noisy, Recipe, Timed, filter, host_bytes, timed};
+use crate::denoise::{Noisy, Recipe, Timed, filter, host_bytes, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime};
 use crate::image::Picture;
@@ -58,7 +58,7 @@ impl<'a> Session<'a> {
         candidates: &'a [Candidate],
         shots: &'a [Shot],
     ) -> Result<Self> {
-        check_clock(gpu)?;
+        gpu.check_clock()?;
         let warm = shots.iter().map(|_| None).collect();
         let moving = motion.map(|motion| Moving::new(scene, motion)).transpose()?;
         Ok(Self { gpu, scene, moving, candidates, shots, warm, frame: FrameResources::new(gpu)? })
@@ -189,7 +189,7 @@ impl<'a> Session<'a> {
         };
         let candidate = &self.candidates[point];
         let Some(method) = candidate.filter else {
-            let picture = finite(renderer.picture()?)?;
+            let picture = renderer.picture()?.finite().map_err(Error::Device)?;
             return Ok(Measured { point, run, picture, warm_up: *costs, device_bytes: *device_bytes });
         };
         let settings = |scales: &filter::Scales| candidate.filter_settings.scaled_by(scales);
@@ -198,7 +198,7 @@ impl<'a> Session<'a> {
         let warm_up = add_filter(&mut run, costs, &filtered);
         let device_bytes = device_bytes + filtered.device_bytes;
         let size = [renderer.settings().width, renderer.settings().height];
-        let picture = finite(interleaved(size, &filtered.colour))?;
+        let picture = Picture::of_planes(size, &filtered.colour).finite().map_err(Error::Device)?;
         Ok(Measured { point, run, picture, warm_up, device_bytes })
     }
 }
@@ -222,17 +222,6 @@ impl Runs for Session<'_> {
     }
 }
 
-/// Checks that a device tells times.
-///
-/// # Errors
-/// [`Error::Device`].
-pub fn check_clock(gpu: &Gpu) -> Result<()> {
-    match gpu.info().timestamp_bits {
-        0 => Err(Error::Device(format!("{} has no timestamps: choose another device", gpu.info().name))),
-        _ => Ok(()),
-    }
-}
-
 /// Adds the times of a filter to those of a render, and returns what the first use of both took.
 pub fn add_filter(run: &mut Run, render: &WarmUp, filtered: &Timed) -> WarmUp {
     let passes = passes(&filtered.times);
@@ -242,23 +231,6 @@ pub fn add_filter(run: &mut Run, render: &WarmUp, filtered: &Timed) -> WarmUp {
     WarmUp {
         compile_ms: render.compile_ms + milliseconds(filtered.compile),
         first_run_ms: render.first_run_ms + milliseconds(filtered.first_run),
-    }
-}
-
-/// A picture of three planes.
-pub fn interleaved([width, height]: [u32; 2], [r, g, b]: &Colour) -> Picture {
-    let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
-    Picture { width, height, pixels }
-}
-
-/// Refuses what no metric can weigh.
-///
-/// # Errors
-/// [`Error::Device`].
-pub fn finite(picture: Picture) -> Result<Picture> {
-    match picture.non_finite() {
-        0 => Ok(picture),
-        n => Err(Error::Device(format!("{n} of {} pixels are NaN or infinite", picture.pixels.len()))),
     }
 }
 

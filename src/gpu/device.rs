@@ -156,6 +156,17 @@ impl Gpu {
         &self.0.info
     }
 
+    /// Checks that the device tells times.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub fn check_clock(&self) -> Result<()> {
+        match self.0.info.timestamp_bits {
+            0 => Err(Error::Device(format!("{} has no timestamps: choose another device", self.0.info.name))),
+            _ => Ok(()),
+        }
+    }
+
     /// Bytes of device memory held by all buffers that exist on the device.
     pub fn allocated_bytes(&self) -> u64 {
         self.0.lock_allocator().as_ref().map_or(0, |a| a.generate_report().total_allocated_bytes)

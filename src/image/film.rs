@@ -72,9 +72,35 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// The picture of a plane per component, each of `width * height` values.
+    pub fn of_planes([width, height]: [u32; 2], [r, g, b]: &[Vec<f32>; 3]) -> Self {
+        let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+        Self { width, height, pixels }
+    }
+
     /// Number of pixels with a NaN or an infinity in any component.
     pub fn non_finite(&self) -> usize {
         self.pixels.iter().filter(|p| !p.iter().all(|v| v.is_finite())).count()
+    }
+
+    /// The picture, if metrics can weigh it.
+    ///
+    /// # Errors
+    /// How many pixels have a NaN or an infinity.
+    pub fn finite(self) -> Result<Self, String> {
+        match self.non_finite() {
+            0 => Ok(self),
+            n => Err(format!("{n} of {} pixels are NaN or infinite, which no metric can weigh", self.pixels.len())),
+        }
+    }
+}
+
+impl From<&Picture> for Film {
+    /// The picture as the colour.
+    fn from(picture: &Picture) -> Self {
+        let mut film = Self::new(picture.width, picture.height);
+        film.add_vec3("", ["R", "G", "B"], &picture.pixels);
+        film
     }
 }
 

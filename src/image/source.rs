@@ -106,8 +106,7 @@ impl Source {
         }
         let invalid = |what: String| std::io::Error::new(ErrorKind::InvalidData, what);
         let shown = self.shown().map_err(|e| invalid(e.to_string()))?;
-        let mut colour = Film::new(shown.width, shown.height);
-        colour.add_vec3("", ["R", "G", "B"], &shown.rec709(layer).map_err(invalid)?.pixels);
-        super::encode(path, &colour, options, stream)
+        let colour = shown.rec709(layer).map_err(invalid)?;
+        super::encode(path, &Film::from(&colour), options, stream)
     }
 }

@@ -5,6 +5,7 @@ use crate::denoise::filter::Method;
 use crate::denoise::{Chain, Colour, Noisy, Recipe, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime, total_ms};
+use crate::image::Picture;
 use crate::render::settings::Settings;
 use crate::render::{Renderer, Step};
 use crate::scene::Scene;
@@ -73,9 +74,7 @@ impl<'a> Probe<'a> {
     /// # Errors
     /// Those of [`Renderer::new`], and [`Error::Device`] for a device that tells no times.
     pub fn new(gpu: &'a Gpu, scene: &'a Scene, settings: &Settings, methods: &'a [Method]) -> Result<Self> {
-        if gpu.info().timestamp_bits == 0 {
-            return Err(Error::Device(format!("{} has no timestamps: choose another device", gpu.info().name)));
-        }
+        gpu.check_clock()?;
         // Batches are as large as those of a render of many samples.
         let spp = if settings.allocate.is_even() { Settings::MAX_SPP.min(4096) } else { 1 };
         let settings = Settings { spp, ..settings.clone() };
@@ -164,12 +163,14 @@ impl<'a> Probe<'a> {
             let traces = matches!(step, Step::Uniform(_) | Step::Listed(_));
             *(if traces { &mut samples_ms } else { &mut start_ms }) += ms;
         }
-        let noisy = finite(self.renderer.picture()?.pixels)?;
-        let mut image = Image { noisy, filtered: Vec::new(), start_ms, samples_ms, filter_ms: Vec::new() };
+        let noisy = self.renderer.picture()?.finite().map_err(Error::Device)?;
+        let size = [noisy.width, noisy.height];
+        let mut image =
+            Image { noisy: noisy.pixels, filtered: Vec::new(), start_ms, samples_ms, filter_ms: Vec::new() };
         for method in 0..self.methods.len() {
             let (colour, times) = self.filtered(method)?.unzip();
-            let pixels = colour.map(|[r, g, b]| (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect());
-            image.filtered.push(pixels.map(finite).transpose()?);
+            let picture = colour.map(|colour| Picture::of_planes(size, &colour).finite()).transpose();
+            image.filtered.push(picture.map_err(Error::Device)?.map(|picture| picture.pixels));
             image.filter_ms.push(times.map_or(0.0, |times| total_ms(&times)));
         }
         self.spent_ms += start_ms + samples_ms + image.filter_ms.iter().sum::<f64>();
@@ -236,13 +237,6 @@ impl Probe<'_> {
 /// Samples per pixel of the level after one of so many; none where a render may not have them.
 fn next_spp(spp: u32) -> Option<u32> {
     spp.checked_mul(GROWTH).filter(|next| *next <= Settings::MAX_SPP)
-}
-
-fn finite(pixels: Vec<[f32; 3]>) -> Result<Vec<[f32; 3]>> {
-    match pixels.iter().filter(|pixel| !pixel.iter().all(|v| v.is_finite())).count() {
-        0 => Ok(pixels),
-        n => Err(Error::Device(format!("{n} pixels of a probe are NaN or infinite"))),
-    }
 }
 
 #[cfg(test)]

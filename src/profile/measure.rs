@@ -4,7 +4,7 @@ use super::frames::{Frames, Workload};
 use super::work::FrameWork;
 use crate::denoise::filter::{FilterSettings, Row};
 use crate::denoise::{Denoiser, Noisy};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{Calibration, FrameResources, Gpu};
 use crate::machine::device_mhz;
 use crate::render::settings::Settings;
@@ -47,7 +47,7 @@ pub fn denoiser(gpu: &Gpu, renderer: &Renderer, row: &Row) -> Result<Denoiser> {
 /// each of the other frames: twice `count`, and one.
 ///
 /// # Errors
-/// [`Error::Device`] for a device without timestamps, and those of a render.
+/// [`crate::error::Error::Device`] for a device without timestamps, and those of a render.
 pub fn measure(
     gpu: &Gpu,
     scene: &Scene,
@@ -56,10 +56,7 @@ pub fn measure(
     count: usize,
     done: &mut dyn FnMut(),
 ) -> Result<Measured> {
-    if gpu.info().timestamp_bits == 0 {
-        let name = &gpu.info().name;
-        return Err(Error::Device(format!("{name} has no timestamps: choose another device to profile on")));
-    }
+    gpu.check_clock()?;
     let outputs = Outputs::for_filter(filter.is_some());
     let counters = count_rays(gpu, scene, settings, Outputs { counters: true, ..outputs })?;
     let ceilings = Ceilings::measure(gpu)?;

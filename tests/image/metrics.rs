@@ -83,6 +83,15 @@ fn flip_is_that_of_the_reference_implementation() {
 }
 
 #[test]
+fn a_picture_of_planes_is_weighed_if_its_pixels_are_numbers() {
+    let planes = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]];
+    let of = |planes: [[f32; 2]; 3]| Picture::of_planes([2, 1], &planes.map(Vec::from)).finite();
+    assert_eq!(of(planes), Ok(picture(2, 1, |x, _| planes.map(|plane| plane[x as usize]))));
+    let refused = of([planes[0], [f32::NAN, f32::INFINITY], planes[2]]).unwrap_err();
+    assert!(refused.starts_with("2 of 2 pixels are NaN or infinite"), "{refused}");
+}
+
+#[test]
 fn the_heat_map_shows_where_and_says_how_much() {
     let test = picture(3, 2, |x, y| if (x, y) == (1, 1) { [0.0, 0.3, 0.6] } else { [0.0; 3] });
     let (map, top) = heat_map(&test, &picture(3, 2, |_, _| [0.0; 3]));

@@ -24,9 +24,8 @@ fn rendered(gpu: &Gpu, scene: &Loaded, filter: Option<Method>) -> Picture {
     support::render(gpu, &renderer);
     let Some(method) = filter else { return renderer.picture().unwrap() };
     let noisy = Noisy::of_film(&renderer).unwrap();
-    let [r, g, b] = Filtered::new(gpu, noisy, &Recipe::new(method)).unwrap().join(gpu).unwrap().colour;
-    let pixels = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
-    Picture { width: 64, height: 64, pixels }
+    let clean = Filtered::new(gpu, noisy, &Recipe::new(method)).unwrap().join(gpu).unwrap();
+    Picture::of_planes([64, 64], &clean.colour)
 }
 
 #[test]

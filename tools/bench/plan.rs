@@ -48,8 +48,7 @@ fn rendered(gpu: &Gpu, scene: &Loaded, plan: &Plan) -> Result<(f64, Picture)> {
     if let Some(method) = method {
         let clean = Filtered::new(gpu, Noisy::of_film(&renderer)?, &Recipe::new(method))?.join(gpu)?;
         times.extend(clean.times);
-        let [r, g, b] = clean.colour;
-        picture.pixels = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
+        picture = Picture::of_planes([picture.width, picture.height], &clean.colour);
     }
     Ok((total_ms(&times), picture))
 }

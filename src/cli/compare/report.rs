@@ -92,7 +92,5 @@ impl Report<'_> {
 /// # Errors
 /// [`Error::Output`].
 pub fn write_png(path: &Path, picture: &Picture) -> Result<()> {
-    let mut film = Film::new(picture.width, picture.height);
-    film.add_vec3("", ["R", "G", "B"], &picture.pixels);
-    image::write(path, &film, &WriteOptions::default())
+    image::write(path, &Film::from(picture), &WriteOptions::default())
 }

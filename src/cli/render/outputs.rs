@@ -95,9 +95,7 @@ fn heatmap(film: &Film, stream: &mut dyn Stream) -> std::io::Result<()> {
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     let values: Vec<f32> = counts.iter().map(|&n| n as f32).collect();
     let picture = false_colours(film.width, &values, most as f32);
-    let mut map = Film::new(picture.width, picture.height);
-    map.add_vec3("", ["R", "G", "B"], &picture.pixels);
-    image::encode(Path::new("map.png"), &map, &WriteOptions::default(), stream)
+    image::encode(Path::new("map.png"), &Film::from(&picture), &WriteOptions::default(), stream)
 }
 
 #[cfg(test)]

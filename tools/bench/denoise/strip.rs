@@ -51,7 +51,5 @@ fn worst_window(picture: &Picture, reference: &Picture) -> [usize; 2] {
 }
 
 pub fn write(picture: &Picture, path: &Path) -> anyhow::Result<()> {
-    let mut film = Film::new(picture.width, picture.height);
-    film.add_vec3("", ["R", "G", "B"], &picture.pixels);
-    Ok(image::write(path, &film, &WriteOptions::default())?)
+    Ok(image::write(path, &Film::from(picture), &WriteOptions::default())?)
 }

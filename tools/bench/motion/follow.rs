@@ -172,9 +172,8 @@ fn picture(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<(Picture, Fi
     let film = job.film(&status)?;
     let noisy = film.picture(None).map_err(|what| anyhow!(what))?;
     let method = Method::all().find(|method| method.name() == "guided").context("a filter of that name")?;
-    let [r, g, b] = Filtered::new(gpu, Noisy::of_film(&renderer)?, &Recipe::new(method))?.join(gpu)?.colour;
-    let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
-    let filtered = Picture { pixels, ..noisy.clone() };
+    let clean = Filtered::new(gpu, Noisy::of_film(&renderer)?, &Recipe::new(method))?.join(gpu)?;
+    let filtered = Picture::of_planes([noisy.width, noisy.height], &clean.colour);
     Ok((noisy, film, filtered))
 }
 

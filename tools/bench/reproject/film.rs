@@ -78,10 +78,9 @@ impl Film {
         let picture = if self.arm.quarters { halved(&picture) } else { picture };
         let Some(name) = self.arm.filter else { return Ok((picture, 0.0)) };
         let method = Method::all().find(|method| method.name() == name).context("a filter of that name")?;
-        let Clean { colour: [r, g, b], times, .. } =
+        let Clean { colour, times, .. } =
             Filtered::new(&self.gpu, Noisy::of_film(&self.renderer)?, &Recipe::new(method))?.join(&self.gpu)?;
-        let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
-        Ok((Picture { pixels, ..picture }, total_ms(&times)))
+        Ok((Picture::of_planes([picture.width, picture.height], &colour), total_ms(&times)))
     }
 }
 

@@ -123,9 +123,8 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn save(path: &Path, picture: &Picture) -> Result<()> {
-    let mut film = image::Film::new(picture.width, picture.height);
-    film.add_vec3("", ["R", "G", "B"], &picture.pixels);
-    image::write(path, &film, &WriteOptions::default()).map_err(|what| anyhow!("{}: {what}", path.display()))
+    image::write(path, &image::Film::from(picture), &WriteOptions::default())
+        .map_err(|what| anyhow!("{}: {what}", path.display()))
 }
 
 /// Its name, its place's base ([`Line::base`]), and an arm.
