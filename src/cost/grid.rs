@@ -123,7 +123,7 @@ fn candidate(base: &Settings, policy: &'static Policy, filter: filter::Method, [
         options: Vec::new(),
         spp,
     };
-    let filter = Some(filter).filter(|filter| filter.name() != "none");
+    let filter = Some(filter).filter(|filter| !filter.is_none());
     Candidate { method, settings, filter, filter_settings: FilterSettings::default(), carries: None }
 }
 

@@ -35,7 +35,7 @@ impl Recipe<'_> {
 
     /// What is cut. Unless it is asked for, nothing where nothing is filtered, nor for Open Image Denoise, which wants the colour whole.
     pub fn fireflies(&self) -> Fireflies {
-        let takes_apart = matches!(self.method, Method::Kernels(row) if row.name != "none");
+        let takes_apart = matches!(self.method, Method::Kernels(_)) && !self.method.is_none();
         if self.fireflies == Fireflies::Usual && !takes_apart { Fireflies::Off } else { self.fireflies }
     }
 

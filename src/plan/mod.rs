@@ -103,7 +103,7 @@ pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], t
     };
     let considered = methods.iter().zip(&forecasts).filter_map(|(method, forecast)| {
         let spp = expected(forecast)?;
-        let denoise = Some(method.name().to_owned()).filter(|name| name != "none");
+        let denoise = (!method.is_none()).then(|| method.name().to_owned());
         Some(Expected { denoise, spp, gpu_ms: forecast.time_of(spp), relmse: forecast.error_of(spp) })
     });
     let mut considered: Vec<Expected> = considered.collect();
@@ -175,7 +175,7 @@ fn out_of_reach(target: Target, forecasts: &[Forecast]) -> Error {
 
 /// What a render without a filter needs, and one with.
 pub(crate) fn outputs(methods: &[Method]) -> Outputs {
-    Outputs::for_filter(methods.iter().any(|method| method.name() != "none"))
+    Outputs::for_filter(!methods.iter().all(|method| method.is_none()))
 }
 
 impl Plan {

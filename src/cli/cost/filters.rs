@@ -51,7 +51,7 @@ fn candidates(args: &Args, image: &Path) -> Result<Vec<FilterCandidate>> {
     let mut varied = Vec::new();
     for variant in &args.variants {
         let before = varied.len();
-        for (filter, plain) in args.denoise.iter().zip(&plain).filter(|(filter, _)| filter.name() != "none") {
+        for (filter, plain) in args.denoise.iter().zip(&plain).filter(|(filter, _)| !filter.is_none()) {
             let candidate = of(filter, variant)?;
             varied.extend((candidate.settings != plain.settings).then_some(candidate));
         }

@@ -1,5 +1,5 @@
 //! What a user can choose to filter an image by.
-use super::{FILTERS, Row, oidn};
+use super::{FILTERS, Row, none, oidn};
 use crate::error::{Error, Result};
 use crate::gpu::Oidn;
 
@@ -24,6 +24,11 @@ impl Method {
             Self::Kernels(row) => row.name,
             Self::Oidn => "oidn",
         }
+    }
+
+    /// Whether it leaves the image as it is.
+    pub fn is_none(self) -> bool {
+        matches!(self, Self::Kernels(row) if row.name == none::ROW.name)
     }
 
     /// One line of help.
