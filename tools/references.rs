@@ -6,6 +6,7 @@ use clap::Parser;
 use significance::Significance;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
+use tallow::image::Picture;
 
 mod compare;
 mod scenes;
@@ -201,7 +202,7 @@ fn judge(row: &Scenario, args: &Args) -> anyhow::Result<(compare::Comparison, Op
     let reference = match row.reference {
         Mean(path) | Visibility(path, _) => data(path, rgb)?,
         Normals(path) => absolute(data(path, rgb)?),
-        Constant(value) => compare::Picture { rgb: vec![[value; 3]; image.rgb.len()], ..image },
+        Constant(value) => Picture { pixels: vec![[value; 3]; image.pixels.len()], ..image },
     };
     let comparison = compare::compare(&image, &reference)?;
     compare::write_difference(&compare::difference(&image, &reference), &reference, &file("-difference"))?;
@@ -213,8 +214,8 @@ fn judge(row: &Scenario, args: &Args) -> anyhow::Result<(compare::Comparison, Op
     Ok((comparison, noise.map(weigh).transpose()?))
 }
 
-fn absolute(mut picture: compare::Picture) -> compare::Picture {
-    picture.rgb.iter_mut().flatten().for_each(|v| *v = v.abs());
+fn absolute(mut picture: Picture) -> Picture {
+    picture.pixels.iter_mut().flatten().for_each(|v| *v = v.abs());
     picture
 }
 

@@ -1,9 +1,10 @@
 //! Tests whether an image differs from its reference by more than the noise of both. This needs a file with the noise of
 //! the reference.
-use crate::compare::{self, Picture};
+use crate::compare;
 use crate::statistics::sidak_quantile;
 use anyhow::{Context, ensure};
 use std::path::Path;
+use tallow::image::Picture;
 
 /// Matrix from linear Rec. 709 to CIE XYZ. Mitsuba computes variances in XYZ and converts them to RGB like colours, so
 /// they are variances only after they are converted back. All tests are made in XYZ.
@@ -67,7 +68,7 @@ pub fn of_render(path: &Path) -> anyhow::Result<Errors> {
 }
 
 fn read(path: &Path, channels: [&str; 3], error2: impl Fn([f64; 3]) -> [f64; 3]) -> anyhow::Result<Errors> {
-    Ok(compare::read(path, channels)?.rgb.into_iter().map(|v| error2(v.map(f64::from))).collect())
+    Ok(compare::read(path, channels)?.pixels.into_iter().map(|v| error2(v.map(f64::from))).collect())
 }
 
 /// Squared standard errors in XYZ from standard errors in RGB. The correlation of the channels is unknown, so full
@@ -82,11 +83,11 @@ fn together(errors: [f64; 3]) -> [f64; 3] {
 /// # Errors
 /// When the sizes differ.
 pub fn test(image: &Picture, reference: &Picture, errors: [&Errors; 2], known: f64) -> anyhow::Result<Significance> {
-    let same = errors.iter().all(|e| e.len() == image.rgb.len()) && image.rgb.len() == reference.rgb.len();
+    let same = errors.iter().all(|e| e.len() == image.pixels.len()) && image.pixels.len() == reference.pixels.len();
     ensure!(same, "the errors are those of an image of another size");
-    let pixels: Vec<Pixel> = (0..image.rgb.len())
+    let pixels: Vec<Pixel> = (0..image.pixels.len())
         .map(|i| {
-            let [a, b] = [image, reference].map(|p| xyz(p.rgb[i].map(f64::from)));
+            let [a, b] = [image, reference].map(|p| xyz(p.pixels[i].map(f64::from)));
             let both = std::array::from_fn(|c| errors[0][i][c] + errors[1][i][c]);
             Pixel { difference: std::array::from_fn(|c| a[c] - b[c]), reference: b, error2: both }
         })
@@ -125,8 +126,8 @@ mod tests {
     fn noisy(seed: u64) -> (Picture, Errors) {
         let mut random = fastrand::Rng::with_seed(seed);
         // Uniform noise of width w has standard deviation w / sqrt 12.
-        let rgb = (0..64 * 64).map(|_| [0.5 + 0.01 * 12f32.sqrt() * (random.f32() - 0.5); 3]).collect();
-        (Picture { width: 64, height: 64, rgb }, vec![together([0.01; 3]); 64 * 64])
+        let pixels = (0..64 * 64).map(|_| [0.5 + 0.01 * 12f32.sqrt() * (random.f32() - 0.5); 3]).collect();
+        (Picture { width: 64, height: 64, pixels }, vec![together([0.01; 3]); 64 * 64])
     }
 
     #[test]
@@ -137,13 +138,13 @@ mod tests {
         let found = test(&image, 0.0);
         assert!(found.passes() && found.block > 1.5, "{found:?}");
         // A block of 4 x 4 has a standard error of 0.01 sqrt(2) / 4 = 0.0035; 0.03 is 8 of them.
-        (0..16).for_each(|i| image.rgb[64 * (20 + i / 4) + 20 + i % 4][1] += 0.03);
+        (0..16).for_each(|i| image.pixels[64 * (20 + i / 4) + 20 + i % 4][1] += 0.03);
         let spot = test(&image, 0.0);
         assert!(spot.mean <= spot.mean_limit && !spot.passes() && spot.block > 5.0, "{spot:?}");
         assert!(test(&image, 0.06).passes(), "as much is known");
         // The image's error is 0.01 sqrt(2) / 64 = 0.00022: 0.3 % of 0.5 are 7 of them, and less than 1 of a block's.
         let mut brighter = noisy(1).0;
-        brighter.rgb.iter_mut().flatten().for_each(|v| *v *= 1.003);
+        brighter.pixels.iter_mut().flatten().for_each(|v| *v *= 1.003);
         let brighter = test(&brighter, 0.0);
         assert!(brighter.mean > 5.0 && brighter.block <= brighter.block_limit, "{brighter:?}");
     }

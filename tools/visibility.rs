@@ -1,10 +1,10 @@
 //! Renders the average visibility of Nori's first assignment: the share of the hemisphere, with all directions weighted
 //! alike, in which nothing lies within a given distance of the first hit. This is not light transport, so no kernel
 //! computes it; the CPU twins of the kernels do.
-use crate::compare::Picture;
 use glam::vec2;
 use rayon::prelude::*;
 use std::path::Path;
+use tallow::image::Picture;
 use tallow::layout::{Camera, NONE};
 use tallow::math::warp::warp_sphere;
 use tallow::scene::Scene;
@@ -24,8 +24,8 @@ pub fn render(scene: &Path, spp: u32, reach: f32) -> anyhow::Result<Picture> {
     let mean = |pixel: u32| {
         (0..spp).map(|i| sample(&scene, &camera, [width, height], pixel, i, reach)).sum::<f32>() / spp as f32
     };
-    let rgb = (0..width * height).into_par_iter().map(|pixel| [mean(pixel); 3]).collect();
-    Ok(Picture { width: width as usize, height: height as usize, rgb })
+    let pixels = (0..width * height).into_par_iter().map(|pixel| [mean(pixel); 3]).collect();
+    Ok(Picture { width, height, pixels })
 }
 
 /// One sample: 1 if nothing is hit, which as in Nori includes rays that leave the scene, else 0.

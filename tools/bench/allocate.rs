@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::gpu::{PerBlock, thread_items};
 use tallow::layout::PixelStats;
+use tallow::profile::median;
 use tallow::render::pass::apportion::Apportion;
 use tallow::render::pass::counts::Counts;
 use tallow::render::pass::sample_list;
@@ -53,9 +54,7 @@ fn main() -> Result<()> {
             sums.into_iter().for_each(|(name, ms)| passes.entry(name).or_default().push(ms));
         }
         let row = |(name, ms): (&&str, &Vec<f64>)| {
-            let mut later = ms[1..].to_vec(); // the first run compiles
-            later.sort_by(f64::total_cmp);
-            vec![(*name).to_owned(), format!("{:.3}", later[later.len() / 2])]
+            vec![(*name).to_owned(), format!("{:.3}", median(&ms[1..]))] // the first run compiles
         };
         println!(
             "\n{spp} samples per pixel\n{}",

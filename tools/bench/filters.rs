@@ -12,6 +12,7 @@ use std::time::Duration;
 use tallow::denoise::filter::{self, Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime, total_ms};
 use tallow::layout::Guide;
+use tallow::profile::median;
 
 /// Pause after a peer's run, whose threads spin for a while before they sleep and would take our cores.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -128,7 +129,7 @@ struct Ours {
 impl Ours {
     fn milliseconds(&self, of: impl Fn(usize, &PassTime) -> bool) -> f64 {
         let run = |run: &Vec<PassTime>| total_ms(run.iter().enumerate().filter(|(i, p)| of(*i, p)).map(|(_, p)| p));
-        median(self.runs.iter().map(run).collect())
+        median(&self.runs.iter().map(run).collect::<Vec<_>>())
     }
 
     /// Prints every pass of filters with few passes, and every kernel of others.
@@ -146,11 +147,6 @@ impl Ours {
             kernels.iter().for_each(|name| println!("  {name:24} {:8.3}", self.milliseconds(|_, p| p.name == *name)));
         }
     }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 fn main() -> Result<()> {
@@ -197,7 +193,7 @@ fn main() -> Result<()> {
         println!("{:26} {ms:8.3}, {:.3} of the first", ours.name, ms / first);
     }
     if !theirs.is_empty() {
-        let theirs = median(theirs);
+        let theirs = median(&theirs);
         println!("peer ({})  {theirs:.2}; ours / theirs {:.2}", case.peer, first / theirs);
     }
     Ok(())

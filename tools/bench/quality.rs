@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, run};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
+use tallow::image::{Picture, metrics};
 use tallow::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
@@ -28,18 +29,10 @@ fn render(
     Ok((tile.guide.read()?, tile.stats.read()?, tile.light.read()?))
 }
 
-/// Returns (MSE, relative MSE with an epsilon of 0.01) over all channels.
-fn errors(image: &[vec4], reference: &[vec3]) -> (f64, f64) {
-    let (mut mse, mut relative) = (0.0, 0.0);
-    for (a, b) in image.iter().zip(reference) {
-        for (a, b) in a.iter().zip(b) {
-            let (off, level) = (f64::from(a - b).powi(2), f64::from(*b).powi(2));
-            mse += off;
-            relative += off / (level + 0.01);
-        }
-    }
-    let share = 1.0 / (3 * image.len()) as f64;
-    (mse * share, relative * share)
+/// Returns (MSE, relMSE).
+fn errors(image: &[vec4], reference: &Picture) -> (f64, f64) {
+    let image = Picture { pixels: image.iter().map(|&[r, g, b, _]| [r, g, b]).collect(), ..*reference };
+    (metrics::mse(&image, reference), metrics::relmse(&image, reference))
 }
 
 /// The settings that matter most to a filter.
@@ -70,7 +63,7 @@ fn main() -> Result<()> {
         stats.iter().zip(light).map(|(&stats, &light)| Pixel { stats, light }.indirect()).collect()
     };
     let (_, stats, light) = render(&gpu, file, side, many, 1)?;
-    let reference = of_pixels(&stats, &light);
+    let reference = Picture { width: side, height: side, pixels: of_pixels(&stats, &light) };
     let (guide, stats, light) = render(&gpu, file, side, spp, 0)?;
     // The statistics include direct light, so the filter estimates the variance of the indirect light itself.
     let light = of_pixels(&stats, &light);

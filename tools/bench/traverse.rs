@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location, Tracing};
 use tallow::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
 use tallow::math::warp::{basis_from_normal, warp_cosine_hemisphere};
+use tallow::profile::median;
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
@@ -191,11 +192,6 @@ fn differing(a: &[Found], b: &[Found], any_hit: bool) -> usize {
     a.iter().zip(b).filter(|&pair| differs(pair)).count()
 }
 
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 /// Prints a row per side and their ratio.
 fn compare(name: &str, host: &Host, device: &mut Device, rounds: usize, any_hit: bool) -> Result<()> {
     device.trace(any_hit)?;
@@ -207,7 +203,7 @@ fn compare(name: &str, host: &Host, device: &mut Device, rounds: usize, any_hit:
         theirs.push(host.rays.len() as f64 / host.run(any_hit).0 * 1e-6);
         ours.push(device.rate(any_hit)? * 1e-6);
     }
-    let (ours, theirs) = (median(&mut ours), median(&mut theirs));
+    let (ours, theirs) = (median(&ours), median(&theirs));
     println!("{name:8} {ours:8.2} Mray/s, obvhs {theirs:8.2} Mray/s, ratio {:.2}; {differ} rays differ", ours / theirs);
     Ok(())
 }

@@ -3,6 +3,7 @@ use super::{Section, push};
 use tallow::denoise::filter::{self, FilterInput, FilterSettings, Planes, Row};
 use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::layout::Guide;
+use tallow::profile::median;
 use tallow::report::html::Table;
 
 const RUNS: usize = 3;
@@ -95,9 +96,7 @@ pub fn median_ms(gpu: &Gpu, row: &Row, settings: &FilterSettings, input: &Filter
         let passes = gpu.run(&mut frame, |rec| filter.record(rec, &planes))?;
         times.push(total_ms(&passes));
     }
-    times.remove(0);
-    times.sort_by(f64::total_cmp);
-    Ok(times[RUNS / 2])
+    Ok(median(&times[1..]))
 }
 
 /// A noisy sphere on a floor. As EAW says, the content does not change the time.

@@ -3,6 +3,7 @@ use super::view::View;
 use crate::Args;
 use anyhow::anyhow;
 use tallow::gpu::{FrameResources, Gpu, total_ms};
+use tallow::image::Picture;
 use tallow::layout::{Guide, PixelStats, vec3, vec4};
 use tallow::render::settings::{Settings, Split};
 use tallow::render::{Job, Outputs, Renderer, Step, traces_paths};
@@ -40,8 +41,8 @@ impl View {
     ///
     /// # Errors
     /// As [`View::render`].
-    pub fn radiance(&self, args: &Args) -> anyhow::Result<Vec<vec3>> {
-        Ok(self.reference(args)?.film.picture(None).map_err(|what| anyhow!(what))?.pixels)
+    pub fn radiance(&self, args: &Args) -> anyhow::Result<Picture> {
+        self.reference(args)?.film.picture(None).map_err(|what| anyhow!(what))
     }
 }
 
@@ -68,14 +69,6 @@ pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
     let (stats, light) = (tile.stats.read()?, tile.light.read()?);
     let pixels = stats.into_iter().zip(light).map(|(stats, light)| Pixel { stats, light }).collect();
     Ok(Rendered { pixels, guide: tile.guide.read()?, ms, path_ms })
-}
-
-/// relMSE of every pixel: the mean over the channels of the squared difference over the reference's square plus 0.01.
-pub fn relative_errors(image: &[vec3], reference: &[vec3]) -> Vec<f64> {
-    let of = |(a, b): (&vec3, &vec3)| {
-        (0..3).map(|c| f64::from(a[c] - b[c]).powi(2) / (f64::from(b[c]).powi(2) + 0.01)).sum::<f64>() / 3.0
-    };
-    image.iter().zip(reference).map(of).collect()
 }
 
 /// Arithmetic mean of the values.

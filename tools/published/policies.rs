@@ -1,10 +1,11 @@
 //! Every policy on five scenes: the relative error at equal samples, and the resulting error at equal time.
-use super::placed::{mean, radiance, relative_errors, render};
+use super::placed::{radiance, render};
 use super::view::View;
 use super::{Section, push};
 use crate::Args;
 use tallow::allocate::{POLICIES, Placing};
 use tallow::gpu::Gpu;
+use tallow::image::{Picture, metrics};
 use tallow::report::html::Table;
 
 /// Average and least number of samples per pixel.
@@ -56,7 +57,8 @@ fn of_view(gpu: &Gpu, args: &Args, view: &View, [spp, least]: [u32; 2]) -> anyho
                 s.allocate.both.filtered = 0.0;
             })?;
             let rendered = render(gpu, &scene)?;
-            *error += mean(&relative_errors(&radiance(&rendered.pixels), reference)) / RUNS as f64;
+            let picture = Picture { pixels: radiance(&rendered.pixels), ..*reference };
+            *error += metrics::relmse(&picture, reference) / RUNS as f64;
             *ms = ms.min(rendered.ms);
         }
     }

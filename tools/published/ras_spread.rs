@@ -82,7 +82,7 @@ pub fn measure(gpu: &Gpu, args: &Args) -> anyhow::Result<Section> {
         Of the published scheme, a sample on average is a round with at most one sample for a pixel.";
     let mut section = Section::new("RAS: the spread of errors against time", &[how]);
     for view in &VIEWS {
-        let truth = view.radiance(args)?;
+        let truth = view.radiance(args)?.pixels;
         let mut table = Table::new(&view.label(args), &["samples", "8 on average", "16", "32", "64"]);
         for policy in policies() {
             let mut cells = vec![policy.name.clone()];
@@ -107,7 +107,7 @@ fn properties(gpu: &Gpu, args: &Args) -> anyhow::Result<Table> {
         where the scaling by luminance saturates in shade."
         .to_owned();
     for (property, view) in &PROPERTIES {
-        let truth = view.radiance(args)?;
+        let truth = view.radiance(args)?.pixels;
         let product = |policy: &str, min, max| {
             let policy = Policy { name: String::new(), policy: policy.to_owned(), min, max };
             let [ms, spread] = measured(gpu, args, view, PROPERTY_SPP, &policy, &truth)?;

@@ -8,6 +8,7 @@ use tallow::denoise::filter::{FilterSettings, Method, OidnQuality, Scales};
 use tallow::denoise::{Clean, ExpectedError, Filtered, Noisy, Recipe};
 use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::image::{Picture, metrics};
+use tallow::profile::median;
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
@@ -95,8 +96,7 @@ fn images(
             took.push(total_ms(&times));
             expected = told;
         }
-        took[1..].sort_unstable_by(f64::total_cmp);
-        Ok(Image { picture, ms: took[1 + (took.len() - 2) / 2], expected })
+        Ok(Image { picture, ms: median(&took[1..]), expected })
     });
     let filtered = filtered.collect::<Result<Vec<_>>>()?;
     Ok((noisy, filtered))

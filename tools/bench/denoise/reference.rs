@@ -3,15 +3,13 @@ use crate::view::View;
 use anyhow::{Context, Result, anyhow, ensure};
 use std::path::Path;
 use tallow::gpu::{FrameResources, Gpu};
-use tallow::image::{self, Film, Picture, WriteOptions};
+use tallow::image::{self, Film, Picture, WriteOptions, metrics};
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::Scene;
 
 /// Noisy images have seed 0: a reference must not be made of their samples.
 const SEED: u32 = 1;
-/// As in `tallow::image::metrics`.
-const RELMSE_EPSILON: f64 = 0.01;
 
 /// An image that others are compared with.
 pub struct Reference {
@@ -42,9 +40,7 @@ impl Reference {
         let picture = film.picture(None).map_err(|what| anyhow!(what))?;
         let variance = film.picture(Some("variance")).map_err(|what| anyhow!(what))?;
         let samples = film.channel("samples").context("has no layer of samples")?.to_f32();
-        let values = picture.pixels.iter().flatten().zip(variance.pixels.iter().flatten());
-        let relative = values.map(|(&mean, &v)| f64::from(v) / (f64::from(mean).powi(2) + RELMSE_EPSILON));
-        let relmse = relative.sum::<f64>() / (3 * picture.pixels.len()) as f64;
+        let relmse = metrics::relative_noise(&picture, &variance.pixels);
         let spp = samples.iter().map(|&n| f64::from(n)).sum::<f64>() / samples.len() as f64;
         Ok(Self { picture, spp, relmse })
     }

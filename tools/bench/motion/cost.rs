@@ -3,6 +3,7 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use std::time::Instant;
 use tallow::gpu::{FrameResources, Gpu, total_ms};
+use tallow::profile::median;
 use tallow::render::{Outputs, Renderer, traces_paths};
 use tallow::report::table;
 use tallow::scene::description::*;
@@ -60,18 +61,12 @@ fn measure(
         let s = renderer.scene();
         handles.push([s.nodes.raw().handle, s.triangles.raw().handle, s.instances.raw().handle, s.lights.raw().handle]);
     }
-    let [posed, recorded, uploaded, paths] = times.map(median);
+    let [posed, recorded, uploaded, paths] = times.map(|ms| median(&ms));
     let made = handles.windows(2).skip(1).filter(|pair| pair[0] != pair[1]).count();
     let share = (posed + recorded + uploaded) / paths;
     let ms = |v: f64| format!("{v:.3}");
     let numbers = [ms(posed), ms(recorded), ms(uploaded), ms(paths), format!("{:.2} %", 100.0 * share)];
     Ok([name.to_owned()].into_iter().chain(numbers).chain([format!("{cost:.3}"), made.to_string()]).collect())
-}
-
-/// The middle one of some values.
-pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 fn film(loaded: Loaded) -> Loaded {

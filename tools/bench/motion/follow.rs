@@ -1,5 +1,4 @@
 //! Characters and a machine that move on a ground: whether hierarchies, filters and samples follow.
-use crate::cost::median;
 use anyhow::{Context, Result, anyhow};
 use std::path::Path;
 use std::time::Instant;
@@ -9,6 +8,7 @@ use tallow::denoise::{Filtered, Noisy, Recipe};
 use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::image::{Film, Picture, Samples, metrics};
 use tallow::layout::NONE;
+use tallow::profile::median;
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer, traces_paths};
 use tallow::report::table;
@@ -122,7 +122,7 @@ fn hierarchies(gpu: &Gpu, name: &str, loaded: &Loaded, frames: u32) -> Result<Ve
         })?;
         cost = worst.max(cost);
         // The first frame compiles kernels.
-        found.push([median(poses.split_off(1)), median(speeds.split_off(1))]);
+        found.push([median(&poses[1..]), median(&speeds[1..])]);
     }
     let [refitted, built] = [found[0], found[1]];
     let triangles = loaded.triangles.len().to_string();

@@ -5,6 +5,7 @@ use crate::published::{Section, placed, push};
 use std::collections::BTreeMap;
 use tallow::allocate::geometry;
 use tallow::gpu::{FrameResources, Gpu};
+use tallow::profile::median;
 use tallow::render::{Job, Outputs, Renderer, Step, traces_paths};
 use tallow::report::html::Table;
 
@@ -32,11 +33,7 @@ fn passes(gpu: &Gpu, renderer: &Renderer, steps: &[Step]) -> anyhow::Result<BTre
             sums.into_iter().for_each(|(name, ms)| times.entry(name).or_default().push(ms));
         }
     }
-    let median = |mut ms: Vec<f64>| {
-        ms.sort_by(f64::total_cmp);
-        ms[ms.len() / 2]
-    };
-    Ok(times.into_iter().map(|(name, ms)| (name, median(ms))).collect())
+    Ok(times.into_iter().map(|(name, ms)| (name, median(&ms))).collect())
 }
 
 /// # Errors
