@@ -1,11 +1,10 @@
-//! Supersampling of filtered light (GIF, section 3.2).
+//! Supersampling of filtered light (GIF, section 3.2). Kernel: `glsl/trace/guide_lookup.comp`. Twin: [`crate::twins::guide_lookup`].
 use super::Renderer;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Kernel, Location, PassTime};
 use crate::layout::{Guide, PathPush, vec3, vec4};
-use crate::render::pass::guide_lookup::{self, Bind};
 use crate::render::settings::Settings;
-use crate::shaders;
+use crate::shaders::guide_lookup::{Bind, Constants};
 
 /// Eye rays of a dispatch, unless there are more pixels: drivers kill what runs for seconds.
 const RAYS_AT_ONCE: u32 = 1 << 22;
@@ -36,7 +35,7 @@ impl Renderer {
         }
         let gpu = &self.gpu;
         let (effects, thread, traverse) = (self.effects, gpu.tuning().thread(), gpu.tuning().traverse(self.stack));
-        let kernel = Kernel::new(gpu, &shaders::guide_lookup::Constants { effects, thread, traverse })?;
+        let kernel = Kernel::new(gpu, &Constants { effects, thread, traverse })?;
         let guide = Buffer::from_slice(gpu, "guide rays", guide)?;
         let filtered = Buffer::from_slice(gpu, "filtered", filtered)?;
         let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;
@@ -61,7 +60,8 @@ impl Renderer {
                 let s = &self.frame.scene;
                 let (scene, frame, ray_query) = (s.bind(), s.bind_frame(), s.bind_world());
                 let (guides, filtered, indirect) = (&guide, &filtered, &indirect);
-                guide_lookup::record(&kernel, rec, Bind { scene, frame, ray_query, guides, filtered, indirect }, &push)
+                let bind = Bind { scene, frame, ray_query, guides, filtered, indirect };
+                rec.dispatch_threads(&kernel, bind, &push, push.pixels)
             })?);
         }
         let light = indirect.read()?.into_iter().map(|sum| sum.map(|v| v / eye_rays as f32));

@@ -3,7 +3,6 @@ pub(crate) mod accumulate;
 pub mod apportion;
 pub mod choose;
 pub mod counts;
-pub(crate) mod guide_lookup;
 pub mod light_change;
 pub(crate) mod path;
 pub(crate) mod primary_hit;
