@@ -50,6 +50,11 @@ macro_rules! effects {
 }
 
 impl Effects {
+    /// Records of a texel each that a path leaves: its radiance, and where light is kept apart two more.
+    pub fn records_per_path(&self) -> usize {
+        if self.split_light { 3 } else { 1 }
+    }
+
     /// (constant id, value) of all effects: an effect's id is its position in the list.
     pub fn entries(&self) -> Vec<(u32, u32)> {
         (0..).zip(self.switches().map(u32::from)).collect()

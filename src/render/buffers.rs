@@ -179,6 +179,14 @@ pub struct FilmTile {
     kept: Kept,
 }
 
+/// The records in `part` of a buffer that has one for each pixel, and all of one that is bound but not read because they are not kept.
+///
+/// # Errors
+/// As [`Buffer::part`].
+pub(super) fn part_if<T: bytemuck::Pod>(is_kept: bool, buffer: &Buffer<T>, part: &Range<usize>) -> Result<Buffer<T>> {
+    if is_kept { buffer.part(part.clone()) } else { Ok(buffer.clone()) }
+}
+
 /// Which buffers of a tile have a record for each pixel. Of one pixel their lengths would not tell.
 #[derive(Clone, Copy)]
 struct Kept {
@@ -264,7 +272,7 @@ impl FilmBuffers {
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, pixels: u32, paths: u32, effects: &Effects, guides: bool) -> Result<Self> {
-        let records = paths as usize * if effects.split_light { 3 } else { 1 };
+        let records = paths as usize * effects.records_per_path();
         let [capacity, window] = extents(gpu.info());
         let starts = (0..pixels).step_by(capacity as usize);
         let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), window, effects, guides);

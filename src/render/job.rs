@@ -166,7 +166,7 @@ impl<'a> Job<'a> {
     pub fn rays_of_a_few(&self, status: &Status) -> Result<[u64; 2]> {
         const RUNS: usize = 16;
         const SAMPLES: usize = 64;
-        let records = if self.renderer.effects().split_light { 3 } else { 1 };
+        let records = self.renderer.effects().records_per_path();
         let (samples, traced) = (&self.renderer.film().samples, status.traced_last as usize);
         let mut sums = [0; 2];
         for first in (0..RUNS).map(|i| i * traced / RUNS) {

@@ -355,7 +355,7 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
 /// Paths per dispatch, whose samples, or what a wavefront keeps of them, have room.
 fn paths_in_flight(gpu: &Gpu, scene: &Scene, settings: &Settings, effects: &Effects) -> u32 {
     let wavefront = gpu.tuning().has_wavefront(scene.stack, settings.max_depth);
-    let records = if effects.split_light { 3 } else { 1 };
+    let records = effects.records_per_path() as u64;
     let waiting = if wavefront { wavefront::BYTES_PER_PATH } else { 0 };
     let DeviceInfo { max_storage_range, max_texel_elements, memory_heap, .. } = *gpu.info();
     let room = room_for_paths(records, waiting, [max_storage_range, max_texel_elements, memory_heap]);

@@ -3,7 +3,7 @@ use super::pair;
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::FoldPush;
-use crate::render::buffers::{FilmBuffers, FilmTile};
+use crate::render::buffers::{FilmBuffers, FilmTile, part_if};
 use crate::render::schedule::{Batch, PathRange};
 use crate::shaders::accumulate::Bind;
 
@@ -46,8 +46,7 @@ fn fold(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, tile: &FilmTile, push: &F
     let end = tile.pixels.min(push.window + tile.window);
     let bound = push.window as usize..end as usize;
     let folded_stats = &tile.stats.part(bound.clone())?;
-    let apart = tile.has_light();
-    let folded_light = &if apart { tile.light.part(bound)? } else { tile.light.clone() };
+    let folded_light = &part_if(tile.has_light(), &tile.light, &bound)?;
     let (samples, offset) = (&f.samples, &f.counts.offset);
     let (stats, light, broken) = (&tile.stats, &tile.light, &f.broken);
     let bind = Bind { samples, stats, light, offset, folded_stats, folded_light, broken };

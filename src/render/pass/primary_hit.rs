@@ -2,7 +2,7 @@
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PathConstants, PathPush};
-use crate::render::buffers::{DeviceScene, FilmTile};
+use crate::render::buffers::{DeviceScene, FilmTile, part_if};
 use crate::shaders::primary_hit::Bind;
 
 /// The specialised kernel.
@@ -20,8 +20,8 @@ pub fn record(
         let (first_pixel, pixels) = (tile.first_pixel + w.start, w.end - w.start);
         let part = w.start as usize..w.end as usize;
         let guides = &tile.guide.part(part.clone())?;
-        let points = &if tile.has_points() { tile.points.part(part.clone())? } else { tile.points.clone() };
-        let seen = &if tile.has_seen() { tile.seen.part(part)? } else { tile.seen.clone() };
+        let points = &part_if(tile.has_points(), &tile.points, &part)?;
+        let seen = &part_if(tile.has_seen(), &tile.seen, &part)?;
         let push = PathPush { constants: *constants, first_pixel, pixels, ..PathPush::default() };
         let (scene, frame, ray_query) = (s.bind(), s.bind_frame(), s.bind_world());
         rec.dispatch_threads(k, Bind { scene, frame, ray_query, guides, points, seen }, &push, pixels)

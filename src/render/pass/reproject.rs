@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::PathConstants;
-use crate::render::buffers::{DeviceScene, FilmTile};
+use crate::render::buffers::{DeviceScene, FilmTile, part_if};
 use crate::render::history::{Forward, History, Way};
 use crate::shaders::{carry, edges, gather, project, remember};
 
@@ -11,7 +11,6 @@ use crate::shaders::{carry, edges, gather, project, remember};
 pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
     t.windows().try_for_each(|w| {
         let part = w.start as usize..w.end as usize;
-        let apart = t.has_light();
         let bind = remember::Bind {
             scene: s.bind(),
             frame: s.bind_frame(),
@@ -22,7 +21,7 @@ pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, 
             previous: &h.previous,
             carried: &h.carried,
             history: &h.records.part(part.clone())?,
-            history_light: &if apart { h.light.part(part.clone())? } else { h.light.clone() },
+            history_light: &part_if(t.has_light(), &h.light, &part)?,
             offered: &h.offered.part(part)?,
             instance_now: &h.numbers.instance_now,
             triangle_now: &h.numbers.triangle_now,
@@ -63,7 +62,6 @@ fn forward(
     rec.dispatch_threads(&way.project, bind, &h.push(c, 0, t.pixels), t.pixels)?;
     t.windows().try_for_each(|w| {
         let part = w.start as usize..w.end as usize;
-        let apart = t.has_light();
         let bind = carry::Bind {
             frame: s.bind_frame(),
             history: &h.records,
@@ -71,7 +69,7 @@ fn forward(
             offered: &h.offered,
             previous: &h.previous,
             stats: &t.stats.part(part.clone())?,
-            light: &if apart { t.light.part(part.clone())? } else { t.light.clone() },
+            light: &part_if(t.has_light(), &t.light, &part)?,
             points: &t.points.part(part.clone())?,
             winner: &h.carried.part(part)?,
         };
@@ -87,7 +85,6 @@ fn backward(
 ) -> Result<()> {
     t.windows().try_for_each(|w| {
         let part = w.start as usize..w.end as usize;
-        let apart = t.has_light();
         let bind = gather::Bind {
             scene: s.bind(),
             frame: s.bind_frame(),
@@ -99,7 +96,7 @@ fn backward(
             changes: h.light_change(),
             previous: &h.previous,
             stats: &t.stats.part(part.clone())?,
-            light: &if apart { t.light.part(part.clone())? } else { t.light.clone() },
+            light: &part_if(t.has_light(), &t.light, &part)?,
             carried: &h.carried.part(part)?,
         };
         rec.dispatch_threads(gather, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
