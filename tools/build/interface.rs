@@ -13,7 +13,7 @@ pub const EFFECTS: &str = "glsl/effects.glsl";
 pub const STRUCTURE: &str = "Structure";
 
 /// A buffer that the kernel binds, or an acceleration structure.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Binding {
     /// Basename of the shared file that declares it; `None` for the kernel itself.
     pub group: Option<String>,
@@ -251,39 +251,44 @@ fn parse_local_size(line: &str) -> Result<(LocalSizeX, u32)> {
 }
 
 fn parse_binding(line: &str) -> Result<Binding> {
-    let buffer = parse_storage(line).or_else(|| parse_texels(line)).or_else(|| parse_uniform(line));
-    buffer.or_else(|| parse_structure(line)).context(
+    let parse = || {
+        let (layout, declared) = line.trim().strip_prefix("layout(")?.split_once(')')?;
+        let (memory, number) = layout.rsplit_once("binding = ")?;
+        let binding = match memory {
+            "scalar, " => storage(declared).or_else(|| uniform(declared)),
+            "" => texels(declared).or_else(|| structure(declared)),
+            _ => None,
+        };
+        Some(Binding { number: number.parse().ok()?, ..binding? })
+    };
+    parse().context(
         "expected `layout(scalar, binding = 0) readonly buffer Name { type field[]; };`, \
          `layout(binding = 0) uniform usamplerBuffer field; // of Type` or \
          `layout(scalar, binding = 0) uniform Name { Type field; };`",
     )
 }
 
-fn parse_storage(line: &str) -> Option<Binding> {
-    let (number, rest) = line.trim().strip_prefix("layout(scalar, binding = ")?.split_once(')')?;
-    let access = match rest.split_once(" buffer ")?.0.trim() {
+fn storage(declared: &str) -> Option<Binding> {
+    let access = match declared.split_once(" buffer ")?.0.trim() {
         "readonly" => "Read",
         "writeonly" => "Write",
         "" | "coherent" => "ReadWrite",
         _ => return None,
     };
-    let (in_glsl, field) = member(rest)?;
-    let field = field.strip_suffix("[]")?.to_owned();
-    let element = rest.split_once("// of ").map_or(in_glsl, |(_, of)| of.trim());
+    let (in_glsl, field) = member(declared)?;
+    let element = declared.split_once("// of ").map_or(in_glsl, |(_, of)| of.trim());
     Some(Binding {
-        group: None,
-        number: number.parse().ok()?,
-        field,
+        field: field.strip_suffix("[]")?.to_owned(),
         element: element.to_owned(),
         in_glsl: in_glsl.to_owned(),
         kind: "Storage",
         access,
+        ..Binding::default()
     })
 }
 
-fn parse_texels(line: &str) -> Option<Binding> {
-    let (number, rest) = line.trim().strip_prefix("layout(binding = ")?.split_once(')')?;
-    let (kind, rest) = rest.trim().strip_prefix("uniform ")?.split_once(' ')?;
+fn texels(declared: &str) -> Option<Binding> {
+    let (kind, rest) = declared.trim().strip_prefix("uniform ")?.split_once(' ')?;
     let kind = match kind {
         "usamplerBuffer" => "UintTexels",
         "samplerBuffer" => "FloatTexels",
@@ -291,41 +296,22 @@ fn parse_texels(line: &str) -> Option<Binding> {
     };
     let (field, element) = rest.split_once("; // of ")?;
     let element = element.split_whitespace().next()?.to_owned();
-    Some(Binding {
-        group: None,
-        number: number.parse().ok()?,
-        field: field.trim().to_owned(),
-        element,
-        in_glsl: String::new(),
-        kind,
-        access: "TexelRead",
-    })
+    Some(Binding { field: field.trim().to_owned(), element, kind, access: "TexelRead", ..Binding::default() })
 }
 
-fn parse_uniform(line: &str) -> Option<Binding> {
-    let (number, rest) = line.trim().strip_prefix("layout(scalar, binding = ")?.split_once(')')?;
-    let (element, field) = member(rest.trim().strip_prefix("uniform ")?)?;
+fn uniform(declared: &str) -> Option<Binding> {
+    let (element, field) = member(declared.trim().strip_prefix("uniform ")?)?;
     Some(Binding {
-        group: None,
-        number: number.parse().ok()?,
         field: field.to_owned(),
         element: element.to_owned(),
         in_glsl: element.to_owned(),
         kind: "Uniform",
         access: "UniformRead",
+        ..Binding::default()
     })
 }
 
-fn parse_structure(line: &str) -> Option<Binding> {
-    let (number, rest) = line.trim().strip_prefix("layout(binding = ")?.split_once(')')?;
-    let field = rest.trim().strip_prefix("uniform accelerationStructureEXT ")?.strip_suffix(';')?;
-    Some(Binding {
-        group: None,
-        number: number.parse().ok()?,
-        field: field.to_owned(),
-        element: String::new(),
-        in_glsl: String::new(),
-        kind: STRUCTURE,
-        access: "",
-    })
+fn structure(declared: &str) -> Option<Binding> {
+    let field = declared.trim().strip_prefix("uniform accelerationStructureEXT ")?.strip_suffix(';')?;
+    Some(Binding { field: field.to_owned(), kind: STRUCTURE, ..Binding::default() })
 }
