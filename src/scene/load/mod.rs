@@ -18,3 +18,14 @@ pub mod obj_part;
 pub mod ply;
 pub mod texture;
 pub mod triangulate;
+
+/// The first of some names, and how many more there are.
+fn few<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
+    const SHOWN: usize = 8;
+    let names: Vec<S> = names.into_iter().collect();
+    let shown = names.iter().take(SHOWN).map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}

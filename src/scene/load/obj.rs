@@ -1,5 +1,6 @@
 //! OBJ files: blocks of statements, parsed in parallel, become meshes in the order of the file. Every mistake has its line.
 use super::blocks::Blocks;
+use super::few;
 use super::library::{self, Library};
 use super::obj_block::{Checked, Indices, NO_INDEX, ObjBlock, Statement};
 use super::obj_part::{Corner, NO_EXTRA, Numbering, Part, PartBuilder};
@@ -270,7 +271,7 @@ impl<'a> Parser<'a> {
         let unknown: Vec<_> = self.unknown.iter().collect();
         let libraries = match self.missing.is_empty() {
             true => String::new(),
-            false => format!(" (no such library: {})", few(&self.missing.iter().collect::<Vec<_>>())),
+            false => format!(" (no such library: {})", few(&self.missing)),
         };
         let late = unknown.iter().any(|name| self.names.contains_key(*name));
         let nowhere = if late { "defined nowhere, or only below their use" } else { "defined nowhere" };
@@ -292,15 +293,6 @@ fn corner(indices: &Indices, defined: [i64; 3]) -> Checked<Corner> {
         corner[i] = u32::try_from(place).map_err(|_| "the file has more than 2^32 vertices: split it")?;
     }
     Ok(corner)
-}
-
-/// The first names of a list, and how many more there are.
-fn few(names: &[&String]) -> String {
-    let shown: Vec<&str> = names.iter().take(8).map(|name| name.as_str()).collect();
-    match names.len() {
-        0..=8 => shown.join(", "),
-        n => format!("{} and {} more", shown.join(", "), n - 8),
-    }
 }
 
 #[cfg(test)]

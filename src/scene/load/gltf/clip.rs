@@ -3,6 +3,7 @@ use super::asset::{Asset, one_line};
 use super::curve::Curve;
 use super::node::{Local, Tree};
 use crate::error::Result;
+use crate::scene::load::few;
 use glam::{DQuat, DVec3};
 use gltf_json::animation::{Animation, Channel as Json, Property};
 use gltf_json::validation::Checked;
@@ -77,28 +78,19 @@ pub fn read(asset: &Asset, tree: &Tree, clip: Option<&str>, warnings: &mut Vec<S
         played.extend(channels);
     }
     if !left.is_empty() {
-        let more = left.len().saturating_sub(LONGEST_LIST);
-        left.truncate(LONGEST_LIST);
-        let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
-        let names = left.join(", ");
-        warnings.push(format!(
-            "not played, since an earlier animation moves the same (a clip can be chosen): {names}{rest}"
-        ));
+        let names = few(&left);
+        warnings.push(format!("not played, since an earlier animation moves the same (a clip can be chosen): {names}"));
     }
     Ok(played)
 }
 
 /// What is said of a clip that is not among those of these names.
 fn missing(names: &[String]) -> String {
-    let some: Vec<_> = names.iter().take(LONGEST_LIST).map(|name| format!("\"{name}\"")).collect();
-    match some.is_empty() {
+    match names.is_empty() {
         true => "is not there: the file has no animations".to_owned(),
-        false => format!("is not there: choose one of {}", some.join(", ")),
+        false => format!("is not there: choose one of {}", few(names.iter().map(|name| format!("\"{name}\"")))),
     }
 }
-
-/// Most names of a message.
-const LONGEST_LIST: usize = 8;
 
 /// The channels of an animation, and a sentence about those that cannot be played.
 fn channels(asset: &Asset, tree: &Tree, animation: &Animation) -> Result<(Vec<Channel>, Option<String>)> {

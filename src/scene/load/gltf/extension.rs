@@ -1,6 +1,7 @@
 //! Extensions of glTF: which ones are understood, and what they hold. Those of materials are in `material`.
 use super::asset::{Asset, one_line};
 use crate::error::{Error, Result};
+use crate::scene::load::few;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -29,10 +30,10 @@ const SILENT: &[&str] = &["KHR_xmp", "KHR_xmp_json_ld"];
 /// materials, which can be shown without.
 pub fn check(asset: &Asset) -> Result<Option<String>> {
     let unknown = |name: &&String| !READ.contains(&name.as_str()) && !SILENT.contains(&name.as_str());
-    let names = |list: Vec<&String>| list.iter().map(|name| one_line(name)).collect::<Vec<_>>().join(", ");
+    let names = |list: Vec<&String>| few(list.iter().map(|name| one_line(name)));
     let (required, used) = (&asset.root.extensions_required, &asset.root.extensions_used);
     let looks = |name: &&String| name.contains("_materials_") || name.contains("_texture_");
-    let needed: Vec<_> = required.iter().filter(unknown).filter(|name| !looks(name)).take(LONGEST_LIST).collect();
+    let needed: Vec<_> = required.iter().filter(unknown).filter(|name| !looks(name)).collect();
     if !needed.is_empty() {
         let what = format!("needs {}, which cannot be read: export it without", names(needed));
         return Err(Error::input(asset.path, what));
@@ -40,14 +41,8 @@ pub fn check(asset: &Asset) -> Result<Option<String>> {
     let mut left: Vec<_> = used.iter().chain(required).filter(unknown).collect();
     left.sort_unstable();
     left.dedup();
-    let more = left.len().saturating_sub(LONGEST_LIST);
-    left.truncate(LONGEST_LIST);
-    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
-    Ok((!left.is_empty()).then(|| format!("{}: not rendered: {}{rest}", asset.path.display(), names(left))))
+    Ok((!left.is_empty()).then(|| format!("{}: not rendered: {}", asset.path.display(), names(left))))
 }
-
-/// Most names of a message.
-const LONGEST_LIST: usize = 8;
 
 /// The extension `name` among `all`, if it is there.
 ///
