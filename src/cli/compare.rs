@@ -8,14 +8,13 @@ mod statistical;
 mod words;
 
 use super::files::check_distinct;
-use super::{Exit, check_png, complain, finite, print, print_json, readable};
+use super::{Exit, check_png, complain, finite, print, print_json, readable, within};
 use crate::error::{Error, Result};
 use crate::image::difference::heat_map;
 use crate::image::metrics::{self, Metrics};
 use crate::image::{self, Picture};
 use crate::report::table;
 use serde_json::json;
-use statistical::from_0;
 use std::path::{Path, PathBuf};
 
 /// Compare an image with its reference: MSE, relMSE, PSNR, SSIM and FLIP
@@ -50,33 +49,20 @@ pub struct Args {
 #[command(next_help_heading = "Limits (exit code 1 when exceeded)")]
 struct Limits {
     /// Largest mean squared error
-    #[arg(long, value_name = "N", value_parser = from_0)]
+    #[arg(long, value_name = "N", value_parser = within(0.0.., "a number of 0 or more"))]
     max_mse: Option<f64>,
     /// Largest relative mean squared error
-    #[arg(long, value_name = "N", value_parser = from_0)]
+    #[arg(long, value_name = "N", value_parser = within(0.0.., "a number of 0 or more"))]
     max_relmse: Option<f64>,
     /// Largest mean FLIP error, 0 to 1
-    #[arg(long, value_name = "N", value_parser = flip)]
+    #[arg(long, value_name = "N", value_parser = within(0.0..=1.0, "a number from 0 to 1"))]
     max_flip: Option<f64>,
     /// Smallest peak signal-to-noise ratio in dB
     #[arg(long, value_name = "DB", value_parser = finite)]
     min_psnr: Option<f64>,
     /// Smallest structural similarity, -1 to 1
-    #[arg(long, value_name = "N", value_parser = ssim)]
+    #[arg(long, value_name = "N", value_parser = within(-1.0..=1.0, "a number from -1 to 1"))]
     min_ssim: Option<f64>,
-}
-
-fn flip(text: &str) -> std::result::Result<f64, String> {
-    up_to_1(text, 0.0)
-}
-
-fn ssim(text: &str) -> std::result::Result<f64, String> {
-    up_to_1(text, -1.0)
-}
-
-fn up_to_1(text: &str, least: f64) -> std::result::Result<f64, String> {
-    let number = finite(text).ok().filter(|v| (least..=1.0).contains(v));
-    number.ok_or_else(|| format!("expected a number from {least} to 1"))
 }
 
 /// Bytes per pixel that the metrics take in addition to the two pictures; 75 were measured at 2048 x 2048.

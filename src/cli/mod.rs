@@ -22,6 +22,7 @@ use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
+use std::ops::RangeBounds;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -208,6 +209,14 @@ fn finite(text: &str) -> std::result::Result<f64, String> {
         Ok(value) if value.is_finite() => Ok(value),
         _ => Err("expected a finite number".to_owned()),
     }
+}
+
+/// Parses a finite number in `range`, which `expected` says in words.
+fn within(
+    range: impl RangeBounds<f64> + Clone + Send + Sync + 'static,
+    expected: &'static str,
+) -> impl Fn(&str) -> std::result::Result<f64, String> + Clone {
+    move |text| finite(text).ok().filter(|number| range.contains(number)).ok_or_else(|| format!("expected {expected}"))
 }
 
 /// A word that a POSIX shell takes as it is.

@@ -2,11 +2,12 @@
 use super::report::{Report, Side};
 use super::{check_sizes, evidence, junit, page, words};
 use crate::cli::files::check_distinct;
-use crate::cli::{Exit, check_png, complain, finite, print, print_json, readable};
+use crate::cli::{Exit, check_png, complain, print, print_json, readable, within};
 use crate::error::{Error, Result};
 use crate::image::significance::{self, Options, Scale, Verdict};
 use crate::image::{self, output};
 use serde_json::{Value, json};
+use std::ops::Bound::{Excluded, Included, Unbounded};
 use std::path::{Path, PathBuf};
 
 /// Options of the test.
@@ -18,16 +19,19 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["layer", "diff", "Limits"])]
     pub statistical: bool,
     /// How often images that are the same may be called different
-    #[arg(long, value_name = "RATE", value_parser = rate, default_value_t = Options::default().false_alarms, requires = "statistical")]
+    #[arg(long, value_name = "RATE", default_value_t = Options::default().false_alarms, requires = "statistical",
+        value_parser = within((Excluded(0.0), Included(0.3)), "a number above 0, up to 0.3"))]
     false_alarms: f64,
     /// Relative difference, beyond the accepted one, that must be visible, or else the images are too noisy to say
-    #[arg(long, value_name = "SHARE", value_parser = above_0, default_value_t = Options::default().resolve, requires = "statistical")]
+    #[arg(long, value_name = "SHARE", default_value_t = Options::default().resolve, requires = "statistical",
+        value_parser = within((Excluded(0.0), Unbounded), "a number above 0"))]
     resolve: f64,
     /// Where it must be visible: pixel, 4x4, 16x16, 64x64, 256x256, 1024x1024, object or image
     #[arg(long, value_name = "SCALE", default_value_t = Options::default().at, requires = "statistical")]
     at: Scale,
     /// Relative difference that does not matter
-    #[arg(long, value_name = "SHARE", value_parser = from_0, default_value_t = Options::default().accept, requires = "statistical")]
+    #[arg(long, value_name = "SHARE", default_value_t = Options::default().accept, requires = "statistical",
+        value_parser = within(0.0.., "a number of 0 or more"))]
     accept: f64,
     /// Image of B's standard errors, for a reference that has no variance of its own
     #[arg(long, value_name = "FILE", requires = "statistical")]
@@ -135,19 +139,4 @@ fn text(report: &Report, args: &Args, full: Option<f32>) -> String {
         );
     }
     text
-}
-
-fn rate(text: &str) -> std::result::Result<f64, String> {
-    finite(text)
-        .ok()
-        .filter(|rate| *rate > 0.0 && *rate <= 0.3)
-        .ok_or_else(|| "expected a number above 0, up to 0.3".to_owned())
-}
-
-fn above_0(text: &str) -> std::result::Result<f64, String> {
-    finite(text).ok().filter(|share| *share > 0.0).ok_or_else(|| "expected a number above 0".to_owned())
-}
-
-pub(super) fn from_0(text: &str) -> std::result::Result<f64, String> {
-    finite(text).ok().filter(|share| *share >= 0.0).ok_or_else(|| "expected a number of 0 or more".to_owned())
 }

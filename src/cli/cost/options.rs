@@ -2,8 +2,8 @@
 use crate::allocate::{AllocateOverrides as Allocate, Policy};
 use crate::cli::common::{Common, with_ranges};
 use crate::cli::filter::options as filter;
-use crate::cli::finite;
 use crate::cli::overrides::Overrides;
+use crate::cli::{finite, within};
 use crate::cost::grid::Axes;
 use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
@@ -89,7 +89,9 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(2..=1000))]
     pub repeats: u32,
     /// Limit of the whole measurement in minutes; 0 is none
-    #[arg(long, value_name = "MINUTES", default_value = "10", value_parser = minutes)]
+    // A million minutes are two years.
+    #[arg(long, value_name = "MINUTES", default_value = "10",
+        value_parser = within(0.0..=1e6, "a number of minutes, or 0 for no limit"))]
     pub budget_minutes: f64,
     /// Image to measure errors against, of the scene and the size [default: rendered]
     #[arg(long, value_name = "FILE")]
@@ -213,10 +215,4 @@ pub fn refused(text: &str, command: &str, e: &clap::Error) -> Error {
     let line = e.to_string();
     let line = line.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
     Error::Usage(format!("\"{}\": {line} (see tallow {command} --help)", text.trim()))
-}
-
-fn minutes(text: &str) -> std::result::Result<f64, String> {
-    let value = finite(text)?;
-    // A million minutes are two years.
-    if (0.0..=1e6).contains(&value) { Ok(value) } else { Err("expected a number of minutes, or 0 for no limit".into()) }
 }
