@@ -2,15 +2,13 @@
 use super::Images;
 use super::document::{Document, Machine, Measurement, Method, Point, SCHEMA, SceneInfo};
 use super::findings::findings;
+use super::interval::CONFIDENCE;
 use super::machine;
 use super::reference::Reference;
 use super::summary::{front, summarise};
 use crate::error::Error;
 use crate::image::Picture;
 use std::time::Duration;
-
-/// Confidence level of all intervals.
-pub const CONFIDENCE: f64 = 0.95;
 
 /// Why a measurement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +68,7 @@ pub fn document(
         (true, true) => Ended::Stopped,
         (true, false) => Ended::Budget,
     };
-    summarise(&mut points, CONFIDENCE);
+    summarise(&mut points);
     let document = Document {
         schema: SCHEMA,
         complete: ended == Ended::Complete,
@@ -87,7 +85,7 @@ pub fn document(
             key: outline.key.clone(),
         },
         front: front(&points),
-        findings: findings(&points, CONFIDENCE),
+        findings: findings(&points),
         points,
     };
     (document, ended)

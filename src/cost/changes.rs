@@ -1,6 +1,6 @@
 //! What options change: points that have some beside the same point without them, run by run.
 use super::document::{Change, Estimate, Finding, Method, Point, Verdict};
-use super::interval;
+use super::interval::{self, CONFIDENCE};
 use super::words::{factor, list};
 
 /// Largest number of options that are named as worth their while, for each point without options.
@@ -13,9 +13,9 @@ struct Factors {
 }
 
 /// Fills in the change of every point that has options, where the same point without them was measured.
-pub fn fill_in(points: &mut [Point], confidence: f64) {
+pub fn fill_in(points: &mut [Point]) {
     let changes: Vec<Option<Change>> =
-        points.iter().map(|point| Some(change(&factors(point, plain(points, point)?)?, confidence))).collect();
+        points.iter().map(|point| Some(change(&factors(point, plain(points, point)?)?))).collect();
     for (point, found) in points.iter_mut().zip(changes) {
         point.summary.iter_mut().for_each(|summary| summary.change = found);
     }
@@ -48,20 +48,20 @@ impl Factors {
     }
 }
 
-fn change(factors: &Factors, confidence: f64) -> Change {
+fn change(factors: &Factors) -> Change {
     let estimate = |logarithms: &[f64]| {
         let values: Vec<f64> = logarithms.iter().map(|l| l.exp()).collect();
-        (!values.is_empty()).then(|| interval::geometric_mean(&values, confidence))
+        (!values.is_empty()).then(|| interval::geometric_mean(&values, CONFIDENCE))
     };
     Change { time: estimate(&factors.time), relmse: estimate(&factors.error), product: estimate(&factors.product()) }
 }
 
 /// Which options lower relMSE times time, for each point without options. All tests together keep the probability of naming a
-/// wrong one below 1 - `confidence`.
-pub fn findings(points: &[Point], confidence: f64) -> Vec<Finding> {
+/// wrong one below 1 - [`CONFIDENCE`].
+pub fn findings(points: &[Point]) -> Vec<Finding> {
     let changed = points.iter().filter_map(|point| Some((point, plain(points, point)?)));
     let changed: Vec<_> = changed.filter_map(|(point, plain)| Some((point, plain, factors(point, plain)?))).collect();
-    let alpha = (1.0 - confidence) / changed.len().max(1) as f64;
+    let alpha = (1.0 - CONFIDENCE) / changed.len().max(1) as f64;
     let of = |without: &Point| {
         let own = changed.iter().filter(|(_, plain, _)| plain.method == without.method);
         let own: Vec<_> = own.map(|(point, _, factors)| (*point, factors)).collect();

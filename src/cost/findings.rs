@@ -4,7 +4,7 @@ use super::changes;
 use super::curve::Curve;
 use super::document::{Estimate, Finding, Point, Verdict};
 use super::gain;
-use super::interval;
+use super::interval::{self, CONFIDENCE};
 use super::scatter;
 use super::words::{factor, list, milliseconds, number, percent};
 
@@ -23,21 +23,21 @@ struct Ranking {
 }
 
 /// Says what the points show. Comparisons between methods use the runs of the same seed, and all of them together keep the
-/// probability of naming a wrong winner below 1 - `confidence`.
-pub fn findings(points: &[Point], confidence: f64) -> Vec<Finding> {
+/// probability of naming a wrong winner below 1 - [`CONFIDENCE`].
+pub fn findings(points: &[Point]) -> Vec<Finding> {
     let candidates = candidates(points);
-    let mut all: Vec<Finding> = candidates.iter().filter_map(|c| halving(c, confidence)).collect();
-    all.extend(gain::finding(&candidates, confidence));
-    all.extend(best_by_time(&candidates, confidence));
-    all.extend(goals(&candidates, confidence));
-    all.extend(singles(points, confidence));
-    all.extend(changes::findings(points, confidence));
+    let mut all: Vec<Finding> = candidates.iter().filter_map(halving).collect();
+    all.extend(gain::finding(&candidates));
+    all.extend(best_by_time(&candidates));
+    all.extend(goals(&candidates));
+    all.extend(singles(points));
+    all.extend(changes::findings(points));
     all.extend(scatter::findings(points));
     all
 }
 
 /// What it costs to halve the error.
-fn halving(candidate: &Candidate, confidence: f64) -> Option<Finding> {
+fn halving(candidate: &Candidate) -> Option<Finding> {
     let factors: Vec<f64> = candidate.curves.values().filter_map(Curve::halving).collect();
     let name = &candidate.name;
     if factors.is_empty() {
@@ -45,7 +45,7 @@ fn halving(candidate: &Candidate, confidence: f64) -> Option<Finding> {
     }
     let [low, high] = range(candidate);
     let falls = factors.iter().all(|f| f.is_finite() && *f > 1.0);
-    let estimate = falls.then(|| interval::geometric_mean(&factors, confidence));
+    let estimate = falls.then(|| interval::geometric_mean(&factors, CONFIDENCE));
     let told = |e: &Estimate| e.low.is_some_and(|low| low > 1.0) && e.high.is_some_and(|high| high < 100.0);
     Some(match estimate.filter(told) {
         Some(estimate) => clear(format!(
@@ -64,9 +64,9 @@ fn range(candidate: &Candidate) -> [f64; 2] {
 }
 
 /// Which method is best at which time.
-fn best_by_time(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
+fn best_by_time(candidates: &[Candidate]) -> Vec<Finding> {
     let times = levels(candidates);
-    let alpha = level(confidence, times.len(), candidates.len());
+    let alpha = level(times.len(), candidates.len());
     let rank = |&time: &f64| {
         // What begins later is no choice at this time, and what has ended keeps its last image.
         let begins = |c: &Candidate| c.begins_by(time);
@@ -87,8 +87,8 @@ fn best_by_time(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
 }
 
 /// Level of each of the tests in one of two families, so that all together are right with the wanted confidence.
-fn level(confidence: f64, places: usize, candidates: usize) -> f64 {
-    (1.0 - confidence) / (2 * places * candidates.saturating_sub(1)).max(1) as f64
+fn level(places: usize, candidates: usize) -> f64 {
+    (1.0 - CONFIDENCE) / (2 * places * candidates.saturating_sub(1)).max(1) as f64
 }
 
 fn same(a: &Ranking, b: &Ranking) -> bool {
@@ -170,20 +170,20 @@ fn ranking(
 }
 
 /// The time to reach some errors, and by which method.
-fn goals(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
+fn goals(candidates: &[Candidate]) -> Vec<Finding> {
     let goals = round_errors(candidates);
-    let alpha = level(confidence, goals.len(), candidates.len());
-    goals.into_iter().filter_map(|error| goal(candidates, error, alpha, confidence)).collect()
+    let alpha = level(goals.len(), candidates.len());
+    goals.into_iter().filter_map(|error| goal(candidates, error, alpha)).collect()
 }
 
-fn goal(candidates: &[Candidate], error: f64, alpha: f64, confidence: f64) -> Option<Finding> {
+fn goal(candidates: &[Candidate], error: f64, alpha: f64) -> Option<Finding> {
     // A method whose first point is better than the goal reaches it there.
     let read = |curve: &Curve| curve.time_of(error).value.max(curve.times()[0]);
     let reaches = |c: &Candidate| range(c)[0] <= error;
     let ranking = ranking(candidates, [&reaches, &|c| !reaches(c)], [&read, &read], alpha);
     let fastest = &candidates[*ranking.best.first()?];
     let times: Vec<f64> = fastest.curves.values().map(read).collect();
-    let Estimate { value, low, high } = interval::geometric_mean(&times, confidence);
+    let Estimate { value, low, high } = interval::geometric_mean(&times, CONFIDENCE);
     let between = low.zip(high).map(|(l, h)| format!(" ({} to {})", milliseconds(l), milliseconds(h)));
     let text = format!("relMSE {} takes {}{}", number(error), milliseconds(value), between.unwrap_or_default());
     let mut finding = match ranking.best[..] {
@@ -216,7 +216,7 @@ fn round_errors(candidates: &[Candidate]) -> Vec<f64> {
 }
 
 /// Comparison of points that do not depend on samples: filters of a given image, whose errors have no noise.
-fn singles(all: &[Point], confidence: f64) -> Vec<Finding> {
+fn singles(all: &[Point]) -> Vec<Finding> {
     let usable = |point: &&Point| point.failed.is_none() && point.method.spp == 0 && !point.runs.is_empty();
     let points: Vec<&Point> = all.iter().filter(usable).collect();
     let error = |point: &Point| point.runs[0].errors.relmse.unwrap_or(f64::INFINITY);
@@ -230,20 +230,20 @@ fn singles(all: &[Point], confidence: f64) -> Vec<Finding> {
     }];
     let is_other = |point: &&&Point| point.method != best.method && point.method.filter != "none";
     let others = points.iter().filter(is_other).filter(|point| changes::plain(all, point).is_none());
-    found.extend(others.map(|point| beside(point, best, confidence)));
+    found.extend(others.map(|point| beside(point, best)));
     found
 }
 
 /// Time and error of one filter beside the most accurate one.
-fn beside(point: &Point, best: &Point, confidence: f64) -> Finding {
+fn beside(point: &Point, best: &Point) -> Finding {
     let ratio = |(a, b): (&super::document::Run, &super::document::Run)| a.gpu_ms / b.gpu_ms;
     let ratios: Vec<f64> = point.runs.iter().zip(&best.runs).map(ratio).collect();
-    let times = interval::geometric_mean(&ratios, confidence);
+    let times = interval::geometric_mean(&ratios, CONFIDENCE);
     let logarithms: Vec<f64> = ratios.iter().map(|r| r.ln()).collect();
     let (name, other) = (point.method.name(), best.method.name());
     let error = |point: &Point| point.runs[0].errors.relmse.unwrap_or_default();
     let more = percent(error(point) / error(best) - 1.0);
-    match interval::differs_from_0(&logarithms, 1.0 - confidence) {
+    match interval::differs_from_0(&logarithms, 1.0 - CONFIDENCE) {
         true => clear(format!(
             "{name} takes {} times the time of {other}, and its relMSE is {more} higher.",
             factor(&times)

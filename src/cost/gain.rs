@@ -2,7 +2,7 @@
 use super::candidate::Candidate;
 use super::curve::Curve;
 use super::document::{Estimate, Finding, Verdict};
-use super::interval;
+use super::interval::{self, CONFIDENCE};
 use super::words::{factor, milliseconds, number};
 
 /// Number of times at which methods are compared, evenly spaced on a logarithmic axis.
@@ -24,7 +24,7 @@ struct Gain<'a> {
 
 /// The least and the most that is gained over the times that uniform unfiltered rendering was measured at. `None` without it, and
 /// without another method that is there as early.
-pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
+pub fn finding(candidates: &[Candidate]) -> Option<Finding> {
     let baseline = candidates.iter().find(|candidate| candidate.is_baseline)?;
     // Times of few samples may vary more between seeds than between numbers of samples.
     let [first, last] = Some(baseline.times()).filter(|[first, last]| first < last)?;
@@ -32,7 +32,7 @@ pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
     // The best of many methods, at the least of many times, is chosen by the very runs that its interval is of: only what holds for all
     // of them together holds for it.
     let compared = LEVELS * candidates.len().saturating_sub(1).max(1);
-    let each = 1.0 - (1.0 - confidence) / compared as f64;
+    let each = 1.0 - (1.0 - CONFIDENCE) / compared as f64;
     let gains: Vec<Gain> =
         (0..LEVELS).filter_map(|i| gain(candidates, baseline, time(i).clamp(first, last), each)).collect();
     let by_factor = |a: &&Gain, b: &&Gain| a.factor.value.total_cmp(&b.factor.value);

@@ -2,6 +2,9 @@
 use super::document::Estimate;
 use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, StudentsT};
 
+/// Confidence level of all intervals that are told.
+pub const CONFIDENCE: f64 = 0.95;
+
 /// Mean of the values, and its two-sided interval at `confidence` by Student's t.
 ///
 /// # Panics

@@ -2,19 +2,19 @@
 use super::changes;
 use super::curve::{Curve, Reading};
 use super::document::{Errors, Estimate, Factor, Pass, Point, Run, Summary};
-use super::interval;
+use super::interval::{self, CONFIDENCE};
 use std::collections::BTreeMap;
 
 /// Curves of uniform unfiltered rendering by seed.
 type Baseline = BTreeMap<u32, Curve>;
 
 /// Fills in the summary of every point that has runs.
-pub fn summarise(points: &mut [Point], confidence: f64) {
+pub fn summarise(points: &mut [Point]) {
     let baseline = baseline(points);
     for point in points.iter_mut().filter(|point| !point.runs.is_empty()) {
-        point.summary = Some(summary(point, &baseline, confidence));
+        point.summary = Some(summary(point, &baseline));
     }
-    changes::fill_in(points, confidence);
+    changes::fill_in(points);
 }
 
 /// The Pareto front of the medians: indices of points that no other point beats in both time and relMSE, the fastest first. Of
@@ -62,22 +62,22 @@ pub(super) fn curves(points: &[&Point]) -> Baseline {
     places.into_iter().filter_map(|(seed, places)| Some((seed, Curve::new(&places)?))).collect()
 }
 
-fn summary(point: &Point, baseline: &Baseline, confidence: f64) -> Summary {
+fn summary(point: &Point, baseline: &Baseline) -> Summary {
     let runs = &point.runs[..];
-    let median = |of: fn(&Run) -> f64| interval::median(&runs.iter().map(of).collect::<Vec<_>>(), confidence);
+    let median = |of: fn(&Run) -> f64| interval::median(&runs.iter().map(of).collect::<Vec<_>>(), CONFIDENCE);
     let inefficiency = |run: &Run| Some(run.errors.relmse? * run.gpu_ms * 1e-3);
     Summary {
         gpu_ms: median(|run| run.gpu_ms),
         wall_ms: median(|run| run.wall_ms),
         passes: passes(runs),
-        errors: errors(runs, confidence),
-        inefficiency: of_all(runs, inefficiency).map(|values| interval::mean_error(&values, confidence)),
-        speed_up: factor(point, baseline, confidence, |curve, run, error| {
+        errors: errors(runs),
+        inefficiency: of_all(runs, inefficiency).map(|values| interval::mean_error(&values, CONFIDENCE)),
+        speed_up: factor(point, baseline, |curve, run, error| {
             let Reading { value, extrapolated } = curve.time_of(error);
             Reading { value: value / run.gpu_ms, extrapolated }
         })
         .filter(|_| point.method.is_baseline() || tells_times(baseline)),
-        error_gain: factor(point, baseline, confidence, |curve, run, error| {
+        error_gain: factor(point, baseline, |curve, run, error| {
             let Reading { value, extrapolated } = curve.error_at(run.gpu_ms);
             Reading { value: value / error, extrapolated }
         }),
@@ -96,12 +96,12 @@ fn passes(runs: &[Run]) -> Vec<Pass> {
 }
 
 /// PSNR is a logarithm already, and SSIM is no error.
-fn errors(runs: &[Run], confidence: f64) -> Errors<Estimate> {
+fn errors(runs: &[Run]) -> Errors<Estimate> {
     let metric = |i: usize| {
         let values = of_all(runs, |run| run.errors.values()[i])?;
         let mean =
             if matches!(Errors::<f64>::NAMES[i], "PSNR" | "SSIM") { interval::mean } else { interval::mean_error };
-        Some(mean(&values, confidence))
+        Some(mean(&values, CONFIDENCE))
     };
     Errors::from_values(std::array::from_fn(metric))
 }
@@ -114,12 +114,7 @@ fn of_all(runs: &[Run], of: impl Fn(&Run) -> Option<f64>) -> Option<Vec<f64>> {
 /// A factor of every run relative to the curve of its own seed, without rises, and the geometric mean of these factors. Uniform
 /// unfiltered rendering is as good as itself. Runs without an error above the noise of the reference tell no factor, and the others
 /// alone would be biased.
-fn factor(
-    point: &Point,
-    baseline: &Baseline,
-    confidence: f64,
-    of: impl Fn(&Curve, &Run, f64) -> Reading,
-) -> Option<Factor> {
+fn factor(point: &Point, baseline: &Baseline, of: impl Fn(&Curve, &Run, f64) -> Reading) -> Option<Factor> {
     if point.method.is_baseline() {
         return Some(Factor {
             estimate: Estimate { value: 1.0, low: Some(1.0), high: Some(1.0) },
@@ -133,7 +128,7 @@ fn factor(
     }
     let values: Vec<f64> = readings.iter().map(|reading| reading.value).collect();
     Some(Factor {
-        estimate: interval::geometric_mean(&values, confidence),
+        estimate: interval::geometric_mean(&values, CONFIDENCE),
         extrapolated: readings.iter().any(|reading| reading.extrapolated),
     })
 }

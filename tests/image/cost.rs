@@ -7,7 +7,6 @@ use tallow::cost::summary::{front, summarise};
 use tallow::image::Picture;
 use tallow::image::metrics::{hdr_flip, relmse};
 
-const CONFIDENCE: f64 = 0.95;
 const SPP: [u32; 4] = [1, 4, 16, 64];
 
 /// How a made-up method behaves: 10 ms and an error of 1 for one sample per pixel, times these factors.
@@ -71,7 +70,7 @@ fn points(truths: &[Truth], spread: Spread, same_images: bool, seed: u64) -> Vec
             all.push(point(truth, spp, runs));
         }
     }
-    summarise(&mut all, CONFIDENCE);
+    summarise(&mut all);
     all
 }
 
@@ -88,7 +87,7 @@ fn the_same_images_under_two_names_have_no_winner() {
     let named = |same_images| {
         let is_named = |seed: &u64| {
             let points = points(&[UNIFORM, twin], spread, same_images, 31 * seed);
-            !winners(&findings(&points, CONFIDENCE)).is_empty()
+            !winners(&findings(&points)).is_empty()
         };
         (0..200_u64).filter(is_named).count()
     };
@@ -98,7 +97,7 @@ fn the_same_images_under_two_names_have_no_winner() {
     // Control: 20 % less error is found.
     let better = Truth { error: 0.8, ..twin };
     let points = points(&[UNIFORM, better], Spread { time: 0.01, error: 0.02 }, false, 5);
-    let found = findings(&points, CONFIDENCE);
+    let found = findings(&points);
     assert!(winners(&found).iter().all(|text| text.contains("twin")) && !winners(&found).is_empty(), "{found:#?}");
 }
 
@@ -106,7 +105,7 @@ fn the_same_images_under_two_names_have_no_winner() {
 fn ties_are_said_to_be_ties() {
     let twin = Truth { allocate: "twin", ..UNIFORM };
     let points = points(&[UNIFORM, twin], Spread { time: 0.0, error: 0.0 }, true, 1);
-    let found = findings(&points, CONFIDENCE);
+    let found = findings(&points);
     assert!(winners(&found).is_empty(), "{found:#?}");
     let tie = |f: &Finding| f.verdict == Verdict::TooNoisy && f.text.contains("cannot tell between uniform and twin");
     assert!(found.iter().any(tie), "{found:#?}");
@@ -165,7 +164,7 @@ fn the_best_of_many_copies_is_rarely_said_to_gain() {
             let runs = method.iter_mut().flat_map(|point| point.runs.iter_mut().zip(factors));
             runs.for_each(|(run, factor)| run.errors.relmse = run.errors.relmse.map(|relmse| relmse * factor));
         }
-        least_gain(gain(&findings(&points, CONFIDENCE))) > 1.0
+        least_gain(gain(&findings(&points))) > 1.0
     };
     // The truth is 1. Its interval may begin above that in 2.5 % of the trials, give or take 0.8 %; by each method's own interval it is
     // 8 %.
@@ -177,13 +176,13 @@ fn the_best_of_many_copies_is_rarely_said_to_gain() {
 fn a_gain_is_told_only_where_its_interval_says_something() {
     let better = Truth { allocate: "better", time: 1.0, error: 0.5 };
     let mut points = points(&[UNIFORM, better], Spread { time: 0.0, error: 0.01 }, false, 6);
-    assert_eq!(gain(&findings(&points, CONFIDENCE)).verdict, Verdict::Clear, "twice the error with 1 % of noise");
+    assert_eq!(gain(&findings(&points)).verdict, Verdict::Clear, "twice the error with 1 % of noise");
     for point in &mut points {
         point.runs.truncate(2);
         let scale = if point.method.is_baseline() { 10.0 } else { 1.0 };
         point.runs[1].errors.relmse = point.runs[0].errors.relmse.map(|relmse| relmse * scale);
     }
-    let found = findings(&points, CONFIDENCE);
+    let found = findings(&points);
     assert_eq!(gain(&found).verdict, Verdict::TooNoisy, "factors 2 and 20: {}", gain(&found).text);
 }
 
@@ -192,7 +191,7 @@ fn methods_that_share_no_seed_are_compared_all_the_same() {
     let worse = Truth { allocate: "other", time: 1.0, error: 10.0 };
     let mut points = points(&[UNIFORM, worse], Spread { time: 0.01, error: 0.05 }, false, 8);
     points[4..].iter_mut().flat_map(|point| &mut point.runs).for_each(|run| run.seed += 100);
-    let found = findings(&points, CONFIDENCE);
+    let found = findings(&points);
     let named = winners(&found);
     assert!(!named.is_empty() && named.iter().all(|text| text.contains("uniform")), "{found:#?}");
     assert!(found.iter().all(|f| !f.text.contains("cannot tell between")), "{found:#?}");
@@ -203,8 +202,8 @@ fn an_option_of_a_point_without_error_is_left_open() {
     for without_error in [0, 1] {
         let mut points = with_options(&[("depth 4", 0.7, 1.1)], Spread { time: 0.01, error: 0.01 }, 12);
         points[without_error].runs[0].errors.relmse = Some(0.0);
-        summarise(&mut points, CONFIDENCE);
-        let found = findings(&points, CONFIDENCE);
+        summarise(&mut points);
+        let found = findings(&points);
         let is_open = |f: &Finding| f.verdict == Verdict::TooNoisy && f.text.contains("gains by depth 4 the data");
         assert!(found.iter().any(is_open), "{found:#?}");
     }
@@ -215,7 +214,7 @@ fn methods_of_known_added_error_are_ranked_so() {
     let added = |allocate, error| Truth { allocate, time: 1.0, error };
     let truths = [added("second", 1.5), UNIFORM, added("third", 2.25)];
     let points = points(&truths, Spread { time: 0.01, error: 0.05 }, false, 4);
-    let found = findings(&points, CONFIDENCE);
+    let found = findings(&points);
     let named = winners(&found);
     assert!(named.len() > 2 && named.iter().all(|text| text.contains("uniform")), "{found:#?}");
     // One sample takes all methods equally long, so chance decides which of them is the fastest.
@@ -252,7 +251,7 @@ fn with_options(options: &[(&str, f64, f64)], spread: Spread, seed: u64) -> Vec<
         }
         all.push(point);
     }
-    summarise(&mut all, CONFIDENCE);
+    summarise(&mut all);
     all
 }
 
@@ -268,7 +267,7 @@ fn what_options_change_is_told_run_by_run() {
             assert!((value / truth - 1.0).abs() < 0.03 && high.unwrap() / low.unwrap() < 1.1, "{value} is not {truth}");
         }
     }
-    let found = findings(&points, CONFIDENCE);
+    let found = findings(&points);
     let texts: Vec<_> = found.iter().map(|finding| finding.text.as_str()).collect();
     assert!(texts[0].starts_with("With depth 4, uniform, 4 spp takes 0.70 ("), "{texts:?}");
     assert!(found[1].verdict == Verdict::TooNoisy && texts[1].contains("gains by same the data"), "{texts:?}");
@@ -280,7 +279,7 @@ fn options_that_change_nothing_are_rarely_named() {
     let options: Vec<_> = (0..20).map(|_| ("same", 1.0, 1.0)).collect();
     let named = |seed: &u64| {
         let points = with_options(&options, Spread { time: 0.03, error: 0.1 }, *seed);
-        findings(&points, CONFIDENCE).iter().any(|finding| finding.text.starts_with("With "))
+        findings(&points).iter().any(|finding| finding.text.starts_with("With "))
     };
     let wrong = (0..200).filter(named).count();
     assert!(wrong <= 18, "{wrong} of 200, of which 5 % are allowed");
@@ -292,7 +291,7 @@ fn points_that_failed_are_in_no_comparison() {
     let mut points = points(&[UNIFORM, better], Spread { time: 0.01, error: 0.01 }, false, 2);
     points[4..].iter_mut().for_each(|point| point.failed = Some("out of memory".into()));
     assert!(front(&points).iter().all(|&i| i < 4));
-    assert!(findings(&points, CONFIDENCE).iter().all(|f| !f.text.contains("broken")));
+    assert!(findings(&points).iter().all(|f| !f.text.contains("broken")));
 }
 
 #[test]
@@ -300,12 +299,12 @@ fn methods_of_an_interrupted_measurement_are_compared_by_the_points_that_were_ru
     let better = Truth { allocate: "better", time: 1.0, error: 0.1 };
     let mut points = points(&[UNIFORM, better], Spread { time: 0.01, error: 0.01 }, false, 3);
     (points[4].runs, points[4].summary) = (Vec::new(), None);
-    let found = findings(&points, CONFIDENCE);
+    let found = findings(&points);
     assert!(winners(&found).iter().all(|text| text.contains("better")) && !winners(&found).is_empty(), "{found:#?}");
-    let alone = findings(&points[..4], CONFIDENCE);
+    let alone = findings(&points[..4]);
     assert!(winners(&alone).is_empty(), "a method alone is not the fastest: {alone:#?}");
     points.iter_mut().for_each(|point| point.runs.truncate(1));
-    let found = findings(&points, CONFIDENCE);
+    let found = findings(&points);
     assert!(found.iter().all(|finding| finding.verdict == Verdict::TooNoisy), "one seed tells nothing: {found:#?}");
 }
 

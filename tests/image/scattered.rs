@@ -3,8 +3,6 @@ use tallow::cost::document::{Errors, Finding, Method, Point, Run, Verdict};
 use tallow::cost::findings::findings;
 use tallow::cost::summary::summarise;
 
-const CONFIDENCE: f64 = 0.95;
-
 /// A point of the method with a run for each time and relMSE.
 fn point(allocate: &str, spp: u32, runs: &[(f64, f64)]) -> Point {
     let method = Method {
@@ -35,8 +33,8 @@ fn method(allocate: &str, error: f64, points: u32) -> Vec<Point> {
 }
 
 fn found(mut points: Vec<Point>) -> (Vec<Point>, Vec<Finding>) {
-    summarise(&mut points, CONFIDENCE);
-    let found = findings(&points, CONFIDENCE);
+    summarise(&mut points);
+    let found = findings(&points);
     (points, found)
 }
 

@@ -255,7 +255,7 @@ mod tests {
             "front": [], "findings": [],
         });
         let mut document: Document = serde_json::from_value(value).unwrap();
-        crate::cost::summary::summarise(&mut document.points, 0.95);
+        crate::cost::summary::summarise(&mut document.points);
         document
     }
 
