@@ -181,15 +181,22 @@ fn table_fits(name: &str, table: &[AliasEntry], entries: usize) -> Checked {
 
 /// Checks that all of `indices`, which belong to `which` in order, are below `count`.
 fn below(which: &str, what: &str, count: usize, indices: impl IntoIterator<Item = u32>) -> Checked {
-    match indices.into_iter().enumerate().find(|(_, index)| *index as usize >= count) {
-        Some((at, index)) => Err(format!("{which} {at} names {what} {index} of {count}")),
-        None => Ok(()),
-    }
+    fit(which, what, count, indices, |index| (index as usize) < count)
 }
 
 /// The same where [`NONE`] is allowed.
 fn below_or_none(which: &str, what: &str, count: usize, indices: impl IntoIterator<Item = u32>) -> Checked {
-    match indices.into_iter().enumerate().find(|(_, index)| *index != NONE && *index as usize >= count) {
+    fit(which, what, count, indices, |index| index == NONE || (index as usize) < count)
+}
+
+fn fit(
+    which: &str,
+    what: &str,
+    count: usize,
+    indices: impl IntoIterator<Item = u32>,
+    fits: impl Fn(u32) -> bool,
+) -> Checked {
+    match indices.into_iter().enumerate().find(|(_, index)| !fits(*index)) {
         Some((at, index)) => Err(format!("{which} {at} names {what} {index} of {count}")),
         None => Ok(()),
     }

@@ -187,8 +187,8 @@ pub struct SceneFile<'a> {
 
 impl<'a> SceneFile<'a> {
     fn of(path: &Path, description: Cow<'a, Description>) -> Self {
-        let (cameras, through, warnings, movers) = Default::default();
-        Self { path: path.to_owned(), description, choices: Choices::default(), cameras, through, warnings, movers }
+        let (choices, cameras, through, warnings, movers) = Default::default();
+        Self { path: path.to_owned(), description, choices, cameras, through, warnings, movers }
     }
 
     /// Reads a scene file (`.toml`, `.gltf`, `.glb`), or takes a model (`.obj`, `.ply`, `.ply.gz`) for one.
@@ -228,16 +228,8 @@ impl<'a> SceneFile<'a> {
             return Err(Error::Usage(what));
         }
         let gltf::Model { cameras, warnings, mover, .. } = asset;
-        let (through, movers) = (0, mover.into_iter().collect());
-        Ok(Self {
-            path: path.to_owned(),
-            description: Cow::Owned(description),
-            choices: Choices { sky, still: false },
-            cameras,
-            through,
-            warnings,
-            movers,
-        })
+        let (choices, movers) = (Choices { sky, still: false }, mover.into_iter().collect());
+        Ok(Self { choices, cameras, warnings, movers, ..Self::of(path, Cow::Owned(description)) })
     }
 
     /// Looks through the camera of this name, which a glTF file holds. The film takes its shape.

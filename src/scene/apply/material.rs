@@ -1,6 +1,6 @@
 //! New numbers of a material, with the ranges that its table has.
-use crate::layout::{BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_MASKED, Material, NONE};
-use crate::scene::load::material::{mark_clear_wall, radiance, reflectance, within};
+use crate::layout::{BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_MASKED, Material};
+use crate::scene::load::material::{is_masked, mark_clear_wall, radiance, reflectance, within};
 use crate::scene::pose::MaterialChange;
 
 /// The material with these numbers. Colours are clamped to [0, 1], since curves may overshoot.
@@ -31,8 +31,7 @@ pub fn changed(m: &Material, to: &MaterialChange) -> Result<Material, String> {
     }
     if let Some(opacity) = to.opacity {
         m.opacity = within(opacity, 1.0, "opacity")?;
-        let masked = m.kind != BSDF_DIELECTRIC && (m.opacity < 1.0 || m.opacity_texture != NONE);
-        m.flags = m.flags & !MATERIAL_MASKED | if masked { MATERIAL_MASKED } else { 0 };
+        m.flags = m.flags & !MATERIAL_MASKED | if is_masked(&m) { MATERIAL_MASKED } else { 0 };
     }
     mark_clear_wall(&mut m);
     Ok(m)

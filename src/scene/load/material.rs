@@ -31,6 +31,11 @@ pub fn mark_clear_wall(m: &mut Material) {
     m.flags = m.flags & !MATERIAL_CLEAR_WALL | if clear { MATERIAL_CLEAR_WALL } else { 0 };
 }
 
+/// Whether its opacity may let rays pass.
+pub fn is_masked(m: &Material) -> bool {
+    m.kind != BSDF_DIELECTRIC && (m.opacity < 1.0 || m.opacity_texture != NONE)
+}
+
 /// Whether it is a thin wall that lets light straight through.
 pub fn is_smooth_wall(m: &Material) -> bool {
     m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA
@@ -67,8 +72,7 @@ impl Materials {
 
     /// Adds a finished material and returns its index.
     pub fn push(&mut self, name: &str, mut material: Material) -> u32 {
-        let masked = material.opacity < 1.0 || material.opacity_texture != NONE;
-        if masked && material.kind != BSDF_DIELECTRIC {
+        if is_masked(&material) {
             material.flags |= MATERIAL_MASKED;
         }
         self.list.push(material);
