@@ -36,7 +36,7 @@ use std::time::{Duration, Instant};
     mut_args(with_ranges(Reproject::default().entries())),
     mut_arg("outputs", |arg| arg.help("Image to write: .exr (all layers), .png or .hdr, with #### for the number of the frame; may be \
         given several times [default: the scene's name + .####.exr]")),
-    mut_args(|arg| { let hide = OF_ONE.contains(&arg.get_id().as_str()); if hide { arg.hide(true) } else { arg } }),
+    mut_args(|arg| { let hide = OF_ONE.iter().any(|(id, _)| arg.get_id() == id); if hide { arg.hide(true) } else { arg } }),
 )]
 pub struct Args {
     /// Frames: 0..96 are 96 frames, 0..=96 one more, 7 is one [default: up to the last key of all that moves]
@@ -69,8 +69,17 @@ pub struct Args {
     pub render: render::Args,
 }
 
-/// Options for one image, which a sequence refuses.
-const OF_ONE: [&str; 6] = ["resume", "checkpoint", "pixel", "time", "error", "plan"];
+type IsGiven = fn(&render::Args) -> bool;
+
+/// Options for one image, which a sequence refuses, and whether they are given.
+const OF_ONE: [(&str, IsGiven); 6] = [
+    ("resume", |args| args.resume.is_some()),
+    ("checkpoint", |args| args.checkpoint.is_some()),
+    ("pixel", |args| args.pixel.is_some()),
+    ("time", |args| args.time.is_some()),
+    ("error", |args| args.error.is_some()),
+    ("plan", |args| args.plan.is_some()),
+];
 
 impl Args {
     /// The options of one frame, whose files have its number.
@@ -115,18 +124,9 @@ impl Args {
     }
 
     fn check(&self) -> Result<()> {
-        let render = &self.render;
-        let of_one = [
-            ("--resume", render.resume.is_some()),
-            ("--checkpoint", render.checkpoint.is_some()),
-            ("--pixel", render.pixel.is_some()),
-            ("--time", render.time.is_some()),
-            ("--error", render.error.is_some()),
-            ("--plan", render.plan.is_some()),
-        ];
-        if let Some((option, _)) = of_one.iter().find(|(_, given)| *given) {
+        if let Some((option, _)) = OF_ONE.iter().find(|(_, is_given)| is_given(&self.render)) {
             return Err(Error::Usage(format!(
-                "{option} is for one image: a sequence goes on where it stopped by itself"
+                "--{option} is for one image: a sequence goes on where it stopped by itself"
             )));
         }
         check_fps(self.fps)?;
