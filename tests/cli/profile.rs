@@ -193,3 +193,11 @@ fn bad_profiles_and_options_are_one_line() {
     complains(&run(&["empty.json", "--trace", "t.json"]), 2, &["--trace"]);
     complains(&run(&[BOX, "--csv", "nowhere/a.csv"]), 5, &["nowhere"]);
 }
+
+#[test]
+fn help_says_what_is_special_about_profiles() {
+    let help = stdout(&tallow(&TempDir::new().unwrap(), &["profile", "--help"]));
+    for words in ["times mean little then", "--compare reads it", "with --compare, the verdict"] {
+        assert!(help.contains(words), "{words}: {help}");
+    }
+}
