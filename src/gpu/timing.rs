@@ -240,6 +240,6 @@ mod tests {
         assert_eq!((slow.begin_ns, slow.duration_ns()), (u64::MAX, 0));
         let early = Clock { bits: 64, period: 2.5 }.pass("early", 100, [110, 150]);
         assert_eq!(early, PassTime { name: "early", begin_ns: 275, end_ns: 375 });
-        assert_eq!(total_ms(&[early, late, early]), 200e-6);
+        assert_eq!(total_ms(&[early, late, early]), 200.0 * 1e-6);
     }
 }

@@ -40,21 +40,20 @@ impl Checkpoint {
     pub fn read(path: &Path, scene: &Scene, settings: &Settings) -> Result<Self> {
         let film = image::read(path)?;
         let checkpoint = Self::of(&film, scene, settings).map_err(|what| Error::input(path, what))?;
-        match checkpoint.most_samples() {
-            // The image would have the former samples, and its metadata would say fewer.
-            most if settings.allocate.is_even() && most > settings.spp => {
-                let (name, spp) = (path.display(), settings.spp);
-                Err(Error::Usage(format!(
-                    "{name}: has {most} samples a pixel, more than --spp {spp}: choose {most} or more"
-                )))
-            }
-            _ => Ok(checkpoint),
+        let (least, most) = checkpoint.samples();
+        if !settings.allocate.is_even() || most <= settings.spp {
+            return Ok(checkpoint);
         }
+        // The image would have the former samples, and its metadata would say fewer.
+        let (name, spp) = (path.display(), settings.spp);
+        let has = if least == most { format!("{most}") } else { format!("{least} to {most}") };
+        Err(Error::Usage(format!("{name}: has {has} samples a pixel, more than --spp {spp}: choose {most} or more")))
     }
 
-    /// Of the pixel that has most.
-    fn most_samples(&self) -> u32 {
-        self.pixels.iter().map(|pixel| next_sample(&pixel.stats)).max().unwrap_or(0)
+    /// Of the pixel that has least, and of that which has most.
+    fn samples(&self) -> (u32, u32) {
+        let counts = self.pixels.iter().map(|pixel| next_sample(&pixel.stats));
+        (counts.clone().min().unwrap_or(0), counts.max().unwrap_or(0))
     }
 
     fn of(film: &Film, scene: &Scene, settings: &Settings) -> std::result::Result<Self, String> {

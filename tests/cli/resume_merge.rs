@@ -172,6 +172,11 @@ fn a_render_that_has_more_samples_than_are_asked_for_is_refused() {
     let fewer = render(&folder, "--spp 5 --resume a.exr -o a.exr");
     complains(&fewer, 2, &["a.exr", "has 6 samples a pixel, more than --spp 5"]);
     assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == before, "it was replaced");
+    let mut uneven = read(&folder, "a.exr");
+    counts(&mut uneven, "samples")[7] = 4;
+    write(&folder, "c.exr", &uneven);
+    let fewer = render(&folder, "--spp 5 --resume c.exr -o a.exr");
+    complains(&fewer, 2, &["c.exr: has 4 to 6 samples a pixel, more than --spp 5: choose 6 or more"]);
     well(render(&folder, "--spp 6 --resume a.exr -o b.exr"));
     assert_eq!(counts(&mut read(&folder, "b.exr"), "samples"), &[6; 64], "as many are no contradiction");
 }

@@ -194,8 +194,9 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
     let gpu = gpu();
     for policy in ["uniform", "geometry", "variance", "both", "threshold"] {
         let scene = scene(|s| {
-            (s.allocate.policy, s.allocate.rounds) = (tallow::allocate::policy(policy).unwrap(), 4);
-            // The last three of 8 rounds are left to chance.
+            // Enough that what an allocation lists is dealt to several rounds.
+            (s.spp, s.allocate.policy, s.allocate.rounds) = (80, tallow::allocate::policy(policy).unwrap(), 4);
+            // The last 75 of 80 rounds are left to chance.
             s.allocate.max_spp = if policy == "threshold" { 5 } else { 0 };
         });
         let whole = render(&gpu, &scene);

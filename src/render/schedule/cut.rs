@@ -1,4 +1,5 @@
 //! How work is cut into batches that fit the buffers.
+use super::step::{TOGETHER, of_round};
 use super::{Batch, PathRange, Step};
 use std::iter::successors;
 
@@ -39,10 +40,14 @@ impl Cut {
     }
 }
 
-/// Deals `paths` listed paths to rounds, path j to round j mod `rounds`, and cuts each round into batches.
-pub(super) fn deal(paths: u64, rounds: u32, batch: u32) -> impl Iterator<Item = Step> + use<> {
+/// Deals `paths` listed paths to rounds, path j to round j mod their number, and cuts each round into batches. So that a picture is
+/// refined evenly, there are as many rounds as can have a full batch and [`TOGETHER`] samples a pixel each, and at least `rounds`.
+pub(super) fn deal(paths: u64, rounds: u32, cut: &Cut) -> impl Iterator<Item = Step> + use<> {
+    let batch = cut.paths;
+    let full = u64::from(batch).max(u64::from(cut.pixels) * u64::from(TOGETHER));
+    let rounds = rounds.max((paths / full).min(u64::from(u32::MAX)) as u32);
     (0..rounds).flat_map(move |round| {
-        let mine = (paths + u64::from(rounds - 1 - round)) / u64::from(rounds);
+        let mine = of_round(paths, round, rounds);
         (0..mine).step_by(batch as usize).map(move |first| {
             let paths = u64::from(batch).min(mine - first) as u32;
             Step::Listed(PathRange { first, paths, round, rounds })

@@ -1,6 +1,7 @@
 //! Where a render that stopped early goes on.
 use super::cut::{Cut, deal};
 use super::rounds::rounds;
+use super::step::of_round;
 use super::{PathRange, Step};
 use crate::render::settings::Settings;
 
@@ -15,18 +16,17 @@ pub struct Progress {
 
 /// The rest of a render whose pixels, their statistics and what they lack were handed back.
 pub fn rest(settings: &Settings, cut: &Cut, progress: Progress) -> impl Iterator<Item = Step> + use<> {
-    deal(progress.pending, 1, cut.paths).chain(rounds(settings, cut, progress.allocations))
+    deal(progress.pending, 1, cut).chain(rounds(settings, cut, progress.allocations))
 }
 
 /// What every pixel still lacks of its allocated `count` once all paths up to the end of `done` are traced.
 pub fn pending(count: &[u32], done: &PathRange) -> Vec<u32> {
-    let rounds = u64::from(done.rounds);
-    // Of the first `paths` of the list, those that belong to a round.
-    let in_round = |paths: u64, round: u32| (paths + rounds - 1 - u64::from(round)) / rounds;
+    let (round, rounds) = (u64::from(done.round), u64::from(done.rounds));
     let end = done.first + u64::from(done.paths);
+    // Of the first `paths` of the list: those of all earlier rounds, and those of this one.
     let traced = |paths: u64| {
-        let before: u64 = (0..done.round).map(|round| in_round(paths, round)).sum();
-        before + in_round(paths, done.round).min(end)
+        let before = paths / rounds * round + (paths % rounds).min(round);
+        before + of_round(paths, done.round, done.rounds).min(end)
     };
     let mut listed = 0;
     let lacks = |&n: &u32| {

@@ -64,17 +64,18 @@ pub struct Begun {
 /// that is left of its budget is placed. Of policies that place a budget.
 pub fn frame(settings: &Settings, cut: &Cut, begun: Begun) -> impl Iterator<Item = Step> + use<> {
     let learns = settings.allocate.policy.placing == Placing::Learning;
-    deal(begun.placed, 1, cut.paths).chain(allocated(settings, learns, cut, 0, begun))
+    deal(begun.placed, 1, cut).chain(allocated(settings, learns, cut, 0, begun))
 }
 
 /// As the paper has it: the threshold is 1 after the least number of samples and falls to 0 at the largest.
 fn choices(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = Step> + use<> {
     let (least, most) = (first_spp(settings), limit(settings));
-    let Cut { pixels, paths, .. } = *cut;
+    let cut = *cut;
+    let pixels = cut.pixels;
     (least + done..settings.spp).flat_map(move |round| {
         let falling = 1.0 - (round - least) as f32 / most.saturating_sub(least).max(1) as f32;
         let threshold = if round < most { falling } else { 0.0 };
-        once(Step::Choose(Choice { pixels, round, threshold })).chain(deal(u64::from(pixels), 1, paths))
+        once(Step::Choose(Choice { pixels, round, threshold })).chain(deal(u64::from(pixels), 1, &cut))
     })
 }
 
@@ -98,11 +99,12 @@ fn needed(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = Ste
     let rest = limit.saturating_sub(first_spp(settings));
     let look = rest.div_ceil(round_count(settings, true, rest)).min(LOOK);
     let rounds = if rest == 0 { 0 } else { rest.div_ceil(look) + u32::BITS };
-    let Cut { pixels, paths, .. } = *cut;
+    let cut = *cut;
+    let pixels = cut.pixels;
     let budget = u64::from(look) * u64::from(pixels);
     let share = Share::Need { threshold: settings.allocate.noise_threshold, limit };
     let plan = Plan { pixels, budget, limit: None, share, rounds: 1 };
-    (done..rounds).flat_map(move |_| once(Step::Allocate(plan)).chain(deal(budget, 1, paths)))
+    (done..rounds).flat_map(move |_| once(Step::Allocate(plan)).chain(deal(budget, 1, &cut)))
 }
 
 fn allocated(
@@ -112,7 +114,8 @@ fn allocated(
     done: u32,
     Begun { placed: first, carried }: Begun,
 ) -> impl Iterator<Item = Step> + use<> {
-    let Cut { pixels, paths, .. } = *cut;
+    let cut = *cut;
+    let pixels = cut.pixels;
     let rest = (u64::from(settings.spp) * u64::from(pixels)).saturating_sub(first);
     let rounds = round_count(settings, learns, (rest / u64::from(pixels.max(1))) as u32);
     let (all, dealt) = if learns { (rounds, 1) } else { (1, rounds) };
@@ -130,7 +133,7 @@ fn allocated(
             share: if learns { Share::All(total + carried) } else { Share::Next },
             rounds: if fills { REFILLS } else { 1 },
         };
-        once(Step::Allocate(plan)).chain(deal(budget, dealt, paths))
+        once(Step::Allocate(plan)).chain(deal(budget, dealt, &cut))
     })
 }
 
@@ -149,10 +152,40 @@ mod tests {
         assert_eq!([2, 6, 7, 8, 10, 13, 32].map(|spp| looks("both", spp, 0)), [1, 2, 3, 3, 4, 4, 4]);
         assert_eq!([looks("geometry", 32, 0), looks("both", 8, 5)], [1, 5]);
         let dealt = |rounds: u32| {
-            let steps = list(&settings("geometry", 32, 1, 0, rounds), &CUT);
+            let steps = list(&settings("geometry", 12, 1, 0, rounds), &CUT);
             steps.iter().any(|s| matches!(s, Step::Listed(range) if range.round > 0))
         };
-        assert!(!dealt(0) && dealt(2), "what does not learn is dealt to rounds only when asked for");
+        assert!(!dealt(0) && dealt(2), "few samples that do not learn are dealt to rounds only when asked for");
+    }
+
+    /// Whenever it stops, be it the first time or once it has gone on. A round of all samples would end at the last pixel.
+    #[test]
+    fn a_picture_is_refined_evenly() {
+        const TOTAL: u32 = 1000;
+        let even = |steps: Vec<Step>| {
+            let (mut count, mut seen) = (0, 0);
+            for step in &steps {
+                match step {
+                    Step::Allocate(plan) => count = (plan.budget / 65) as u32,
+                    Step::Listed(range) => {
+                        let lacks = super::super::pending(&[count; 65], range);
+                        let [least, most] = [lacks.iter().min(), lacks.iter().max()].map(Option::unwrap);
+                        assert!(most - least <= 16, "a round has 8, and 7 are left over: {least} to {most} of {count}");
+                        seen = seen.max(count - most);
+                    }
+                    _ => count = TOTAL,
+                }
+            }
+            assert!(seen > 100, "control: {seen}");
+            let paths: u64 = steps.iter().map(Step::paths).sum();
+            assert!(steps.len() as u64 <= paths.div_ceil(CUT.paths.into()) * 11 / 10, "{} steps", steps.len());
+        };
+        for policy in ["both", "geometry"] {
+            even(list(&settings(policy, TOTAL, 1, 0, 0), &CUT));
+        }
+        let pending = u64::from(TOTAL) * 65;
+        let resumed = rest(&settings("uniform", TOTAL, 1, 0, 0), &CUT, Progress { allocations: 0, pending });
+        even(once(Step::Start).chain(resumed).collect());
     }
 
     #[test]

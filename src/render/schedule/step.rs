@@ -88,13 +88,19 @@ pub enum Step {
 
 /// Samples of a pixel that are traced by neighbouring threads, where a step has as many: their rays go alike, and lavapipe takes a tenth
 /// longer where they are fewer.
-const TOGETHER: u32 = 8;
+pub(super) const TOGETHER: u32 = 8;
+
+/// Of the first `paths` of a list that is dealt to `rounds`, those of one round.
+pub(super) fn of_round(paths: u64, round: u32, rounds: u32) -> u64 {
+    paths.saturating_sub(round.into()).div_ceil(rounds.into())
+}
 
 impl Step {
     /// What there is to do of it when the list has `listed` paths, which after [`Step::Choose`] and for
     /// [`Share::Need`] only the device knows.
     pub fn within(self, listed: u64) -> Option<Self> {
         let Self::Listed(range) = self else { return Some(self) };
+        let listed = of_round(listed, range.round, range.rounds);
         let paths = listed.saturating_sub(range.first).min(u64::from(range.paths)) as u32;
         (paths > 0).then_some(Self::Listed(PathRange { paths, ..range }))
     }
