@@ -40,7 +40,7 @@ constants! {
     MATERIAL_NONLINEAR: uint = 16;
     /// [`Material::flags`]: the colours of vertices multiply `emission`.
     MATERIAL_UNLIT: uint = 32;
-    /// [`Material::flags`]: it shines from behind, too, which light sampling does not choose.
+    /// [`Material::flags`]: it shines from behind, too.
     MATERIAL_EMITS_BEHIND: uint = 64;
     /// [`Material::flags`]: a smooth thin wall without a coat, which shadow rays of lights without extent pass.
     MATERIAL_CLEAR_WALL: uint = 128;

@@ -104,7 +104,7 @@ pub struct MaterialTable {
     pub roughness_texture: Option<TextureTable>,
     /// Whether both sides scatter light; default true.
     pub two_sided: Option<bool>,
-    /// Whether it shines from behind, too; default false. Light sampling chooses the front alone, so that what lies behind has more noise.
+    /// Whether it shines from behind, too; default false.
     pub emission_two_sided: bool,
     /// Coated: light that is reflected below the coat takes on the base's colour each time; default false.
     pub nonlinear: bool,
