@@ -31,17 +31,24 @@ pub fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, 
     PngEncoder::new(&mut out)
         .write_image(&bytes, picture.width, picture.height, ExtendedColorType::Rgb8)
         .map_err(|e| e.to_string())?;
+    out.splice(PNG_HEADER..PNG_HEADER, SRGB);
     Ok(out)
 }
 
+/// Bytes of a PNG before the chunks that tell of its colours: the signature and the chunk IHDR.
+const PNG_HEADER: usize = 8 + 25;
+/// The chunk that says that values are sRGB, to be shown with perceptual intent: length, name, intent, checksum.
+const SRGB: [u8; 13] = *b"\0\0\0\x01sRGB\0\xae\xce\x1c\xe9";
+
 /// Encodes RGBE, which has no sign and no infinities: negative values and NaN become 0, values are limited to the largest that it
-/// holds, and pixels below its smallest exponent become black (the encoder would let that wrap around).
+/// holds, and pixels below its smallest exponent become black (the encoder would let that wrap around). All others are rounded here,
+/// since the encoder cuts off.
 pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
-    const LARGEST: f32 = 1.7e38;
-    const SMALLEST: f32 = 1e-38;
+    const LARGEST: f32 = 255.0 * (1u128 << 119) as f32;
+    const SMALLEST: f32 = f32::MIN_POSITIVE;
     let held = |p: &[f32; 3]| {
         let light = p.map(|v| if v > 0.0 { v.min(LARGEST) } else { 0.0 });
-        Rgb(if light.iter().any(|&v| v >= SMALLEST) { light } else { [0.0; 3] })
+        Rgb(if light.iter().any(|&v| v >= SMALLEST) { nearest(light) } else { [0.0; 3] })
     };
     let pixels: Vec<_> = picture.pixels.iter().map(held).collect();
     let mut out = Vec::new();
@@ -49,6 +56,16 @@ pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
         .encode(&pixels, picture.width as usize, picture.height as usize)
         .map_err(|e| e.to_string())?;
     Ok(out)
+}
+
+/// The nearest colour whose channels are multiples, up to 255, of 1/256 of one power of two. The brightest is a normal number.
+fn nearest(light: [f32; 3]) -> [f32; 3] {
+    // A float's exponent alone is the largest power of two in it, 128 units.
+    let unit = |v: f32| f32::from_bits(v.to_bits() & 0x7f80_0000) / 128.0;
+    let brightest = light.into_iter().fold(0.0, f32::max);
+    // What rounds to 256 units has twice the unit.
+    let unit = unit((brightest / unit(brightest)).round() * unit(brightest));
+    light.map(|v| (v / unit).round() * unit)
 }
 
 /// How the HDR files of Radiance begin, and those of other programs, which the decoder does not know.

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 pub type Primaries = [[f32; 2]; 4];
 
 /// Those of ITU-R BT.709, which are sRGB's.
-const REC709: Primaries = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
+pub(crate) const REC709: Primaries = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
 
 /// Chromaticities closer than this are the same: files round them.
 const ALIKE: f32 = 2e-3;

@@ -3,6 +3,7 @@ use super::pace::Pace;
 use super::{Checkpoint, PathRange, Renderer, Step, film, provenance, resume};
 use crate::error::Result;
 use crate::gpu::{FrameResources, PassTime};
+use crate::image::primaries::REC709;
 use crate::image::{Film, SOFTWARE, Samples};
 use crate::render::schedule::Cut;
 use crate::statistics::BrokenSamples;
@@ -82,7 +83,7 @@ impl<'a> Job<'a> {
 
     /// Runs it. Before each step `between` is told how far it is, may read the renderer's buffers (the renderer waits), and
     /// says whether to go on: that is the place to show progress, to look at a clock or a button, and to write a
-    /// [`Job::film`] every so often.
+    /// [`Job::film`] every so often. Of the last step the status tells that is returned.
     ///
     /// # Errors
     /// As [`Renderer::run`] and [`Renderer::resume`], and those of `between`.
@@ -142,6 +143,7 @@ impl<'a> Job<'a> {
     /// [`crate::error::Error::Device`].
     pub fn film(&self, status: &Status) -> Result<Film> {
         let mut film = film::read_back(self.renderer)?;
+        film.primaries = Some(REC709);
         film.metadata.insert(SOFTWARE.to_owned(), format!("tallow {}", env!("CARGO_PKG_VERSION")));
         film.metadata.insert(film::ALBEDO.to_owned(), film::OF_SAMPLES.to_owned());
         film.metadata.insert(film::SHARP_DIRECT.to_owned(), self.renderer.sharp_direct().to_string());

@@ -77,6 +77,7 @@ fn an_engine_renders_to_a_threshold_and_resumes_where_it_was_interrupted() {
             "{policy}: other bits than those of the render that never stopped"
         );
         assert!(channels(&part) != channels(&whole), "{policy}: control");
+        assert_eq!(whole.primaries.map(|[red, ..]| red), Some([0.64, 0.33]), "Rec. 709");
     }
     assert_silent(&gpu);
 }

@@ -242,10 +242,43 @@ fn both_signatures_of_hdr_are_read_alike() {
     assert!(image::read(&path).unwrap().picture(None).unwrap().pixels == a);
 }
 
+/// RGBE cuts off what 8 bits do not hold: half a unit, which is much of a dark channel beside a bright one.
+#[test]
+fn hdr_keeps_the_light_of_dark_channels() {
+    let pixel = |i: u32| {
+        let [v, share] = [1.0 + i as f32 / 1024.0, (i.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32];
+        [v, 0.5 * share * v, 0.25 * share * v]
+    };
+    let pixels: Vec<_> = (0..4096).map(pixel).collect();
+    let read = write_and_read("a.hdr", &pixels, &WriteOptions::default());
+    for c in 0..3 {
+        let [sum, of] = [&read, &pixels].map(|all| all.iter().map(|p| f64::from(p[c])).sum::<f64>());
+        assert!((sum / of - 1.0).abs() < 1e-3, "channel {c}: {}", sum / of);
+    }
+    // What rounds up to the next power of two, for which the last has no exponent.
+    let ends = [[1.999, 0.99, 0.0], [1.7e38, 3e38, f32::INFINITY]];
+    let read = write_and_read("a.hdr", &ends, &WriteOptions::default());
+    assert_eq!(read[0], [2.0, 0.984375, 0.0]);
+    assert!(read[1].iter().all(|&v| v > 1.69e38 && v.is_finite()), "{read:?}");
+}
+
 #[test]
 fn light_too_little_for_hdr_is_black() {
     let read = write_and_read("a.hdr", &[[1e-40; 3], [1e-44, 0.0, 0.0], [1.0; 3]], &WriteOptions::default());
     assert!(read[..2].iter().flatten().all(|&v| v <= 1e-38) && (read[2][0] - 1.0).abs() < 0.01, "{read:?}");
+}
+
+#[test]
+fn a_png_says_that_it_is_srgb() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    let mut film = Film::new(1, 1);
+    film.add_vec3("", ["R", "G", "B"], &[[0.5; 3]]);
+    image::write(&path, &film, &WriteOptions::default()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    // Chunks have a length and a name before their data, and a checksum behind, which the decoder proves.
+    assert_eq!(bytes[33..42], *b"\0\0\0\x01sRGB\0");
+    assert!(image::decode(&bytes).unwrap().picture(None).unwrap().pixels[0][0] > 0.49);
 }
 
 #[test]
