@@ -2,7 +2,7 @@
 //! the last one.
 use super::complain;
 use super::files::{Files, Item, partial_name};
-use crate::image::{self, Film, WriteOptions};
+use crate::image::{self, Film, WriteOptions, output};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -15,11 +15,12 @@ pub struct CheckpointFile {
     complained: bool,
 }
 
-/// Path for the checkpoints of a render with these outputs: beside the first output that holds all layers, or in the
-/// working folder under the name of the scene.
+/// Path for the checkpoints of a render with these outputs: beside the first that holds all layers, or else the first; in the
+/// working folder under the name of the scene where all are pipes.
 pub fn path(outputs: &[PathBuf], scene: &Path) -> PathBuf {
-    let first = outputs.iter().find(|path| image::has_layers(path));
-    partial_name(&first.cloned().unwrap_or_else(|| default_output(scene)))
+    let layers = outputs.iter().find(|path| image::has_layers(path));
+    let first = layers.or_else(|| outputs.iter().find(|path| !output::is_special(path)));
+    partial_name(&first.map_or_else(|| default_output(scene), |path| path.with_extension("exr")))
 }
 
 /// Default output: the name of the scene with the extension .exr, in the working folder.
@@ -81,7 +82,8 @@ mod tests {
     fn it_goes_beside_the_first_file_with_layers() {
         let outputs = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
         assert_eq!(path(&outputs(&["a.png", "x/b.exr", "c.exr"]), Path::new("s.toml")), Path::new("x/b.partial.exr"));
-        assert_eq!(path(&outputs(&["a.png"]), Path::new("scenes/s.toml")), Path::new("s.partial.exr"));
+        assert_eq!(path(&outputs(&["x/a.png", "b.hdr"]), Path::new("s.toml")), Path::new("x/a.partial.exr"));
+        assert_eq!(path(&outputs(&["/dev/null"]), Path::new("scenes/s.toml")), Path::new("s.partial.exr"));
     }
 
     #[test]

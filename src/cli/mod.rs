@@ -78,12 +78,13 @@ pub enum Exit {
 /// Runs the command line and returns its exit code. An error is printed in one line on stderr.
 pub fn main() -> ExitCode {
     crash::report_panics();
-    let result = match parse(std::env::args_os()) {
+    let words: Vec<_> = std::env::args_os().collect();
+    let result = match parse(&words) {
         Ok(cli) => {
             interrupt::install(&interruption(&cli.command));
             run(cli.command)
         }
-        Err(e) => usage(&e),
+        Err(e) => usage(&e, &words),
     };
     match result {
         Ok(exit) => ExitCode::from(exit as u8),
@@ -95,7 +96,7 @@ pub fn main() -> ExitCode {
 }
 
 /// Parses the command line. A negative number is always the value of an option and never an option itself.
-fn parse(words: impl IntoIterator<Item = OsString>) -> std::result::Result<Cli, clap::Error> {
+fn parse(words: &[OsString]) -> std::result::Result<Cli, clap::Error> {
     let numbers = |arg: Arg| match arg.get_long().is_some() && arg.get_action().takes_values() {
         true => arg.allow_negative_numbers(true),
         false => arg,
@@ -127,7 +128,7 @@ fn run(command: Command) -> Result<Exit> {
 }
 
 /// Prints clap's help or version, or turns its error message into one line with the problem and the tip.
-fn usage(e: &clap::Error) -> Result<Exit> {
+fn usage(e: &clap::Error, words: &[OsString]) -> Result<Exit> {
     let text = e.render().to_string();
     if !e.use_stderr() {
         return print(&text).map(|()| Exit::Done);
@@ -141,7 +142,10 @@ fn usage(e: &clap::Error) -> Result<Exit> {
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
     let parts = text.split("\n\n").map(one_line).filter(|p| !p.starts_with("Usage:") && !p.starts_with("For more"));
     let message = parts.collect::<Vec<_>>().join("; ");
-    Err(Error::Usage(format!("{} (see tallow --help)", message.trim_start_matches("error: "))))
+    let (message, command) = (message.trim_start_matches("error: "), Cli::command());
+    let subcommand = words.get(1).and_then(|word| command.find_subcommand(word));
+    let subcommand = subcommand.map_or_else(String::new, |found| format!("{} ", found.get_name()));
+    Err(Error::Usage(format!("{message} (see tallow {subcommand}--help)")))
 }
 
 /// Escapes control characters, because names in files may contain terminal commands or line breaks.

@@ -56,8 +56,8 @@ pub struct Args {
     /// Continue a render from the .exr file that it wrote when it was interrupted, or that has fewer samples
     #[arg(long, value_name = "FILE")]
     pub resume: Option<PathBuf>,
-    /// Every so many minutes, write what there is to NAME.partial.exr, beside the first .exr output: --resume continues it
-    /// after a crash. It is removed when the render is complete
+    /// Every so many minutes, write what there is to NAME.partial.exr, beside the first .exr output, or else the first output:
+    /// --resume continues it after a crash. It is removed when the render is complete
     #[arg(long, value_name = "MINUTES", value_parser = checkpoint::minutes)]
     pub checkpoint: Option<Duration>,
     /// Write the samples per pixel in false colours to a .png
@@ -265,7 +265,7 @@ impl Taken<'_> {
             let (times, told) = host.time("denoise", || denoised(gpu, method, noisy, film, planned))?;
             status.times.extend(times);
             *notes = told;
-            host.time("write", || Ok(outputs::save(args, film, files, None, true)))?;
+            written = host.time("write", || Ok(outputs::save(args, film, files, None, true)))?;
         }
         fail_on_messages(gpu)?;
         let mut more: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
@@ -277,7 +277,7 @@ impl Taken<'_> {
             files.end();
         }
         let summary = outcome.summary(&written);
-        args.common.report(&summary, || text(&summary))?;
+        args.common.report(&summary, || text(args, &summary))?;
         files.failure().map_or(Ok(()), Err)?;
         Ok(Ended { exit: if whole { Exit::Done } else { Exit::Interrupted }, written })
     }

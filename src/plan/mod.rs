@@ -253,7 +253,7 @@ impl Plan {
             Target::GpuMs(ms) => format!("{ms} ms of GPU time"),
             Target::RelMse(error) => format!("a relMSE of {error}"),
         };
-        let chosen = format!("planned for {target}: {} (the probe took {:.1} ms)", of(&self.chosen), self.probe_ms);
+        let chosen = format!("planned for {target}: {}", of(&self.chosen));
         std::iter::once(chosen).chain(self.others.iter().map(|other| format!("rather than {}", of(other)))).collect()
     }
 }

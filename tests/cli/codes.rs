@@ -33,13 +33,14 @@ fn usage_errors_are_one_line_and_exit_2() {
     let folder = tempfile::tempdir().unwrap();
     let run = |words: &[&str]| tallow(&folder, words);
     complains(&run(&[]), 2, &["error: name a command"]);
-    complains(&run(&["compare", "a.exr"]), 2, &["<B>"]);
+    complains(&run(&["compare", "a.exr"]), 2, &["<B>", "(see tallow compare --help)"]);
+    complains(&run(&["--compare"]), 2, &["(see tallow --help)"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--max-mes", "1"]), 2, &["'--max-mes'", "tip:", "'--max-mse'"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--min-psnr", "nan"]), 2, &["finite"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--diff", "d.exr"]), 2, &["d.exr", ".png"]);
     complains(&run(&["render", "s.toml", "-o", "a.tif"]), 2, &["a.tif", ".exr", ".png", ".hdr"]);
     complains(&run(&["render", "s.toml", "--sampler", "x"]), 2, &["sobol"]);
-    complains(&run(&["render", "s.toml", "--width", "wide"]), 2, &["--width"]);
+    complains(&run(&["render", "s.toml", "--width", "wide"]), 2, &["--width", "(see tallow render --help)"]);
     complains(&run(&["render", "s.toml", "--checkpoint", "0"]), 2, &["--checkpoint", "minutes above 0"]);
     let negative = run(&["render", "s.toml", "--spp", "-1"]);
     complains(&negative, 2, &["'-1'", "'--spp <N>'"]);

@@ -22,6 +22,7 @@ fn a_plan_is_rendered_and_rendered_again_to_the_same_bits() {
     assert!(first.status.success(), "{first:?}");
     let text = stdout(&first);
     assert!(text.contains("planned for a relMSE of 0.02: ") && text.contains("rather than "), "{text}");
+    assert!(text.contains(", and the probe before ") && text.ends_with("\nwritten: a.exr\n"), "{text}");
     let plan: Value = serde_json::from_slice(&std::fs::read(folder.path().join("plan.json")).unwrap()).unwrap();
     assert!(
         plan["chosen"]["relmse"].as_f64().unwrap() <= 0.0201 && plan["others"].as_array().unwrap().len() == 1,
@@ -40,6 +41,7 @@ fn a_plan_is_rendered_and_rendered_again_to_the_same_bits() {
     std::fs::write(folder.path().join("slow.json"), slow.to_string()).unwrap();
     let missed = stdout(&render(&folder, SCENE, "--plan slow.json -o b.exr"));
     assert!(missed.contains(&format!("where {long:.1} ms were planned")), "{missed}");
+    assert!(!missed.contains("probe"), "nothing was probed: {missed}");
     // Control: other samples are other bits.
     assert!(render(&folder, SCENE, &format!("{SMALL} --error 0.02 --seed 7 -o c.exr")).status.success());
     assert!(picture("a.exr") != picture("c.exr"));

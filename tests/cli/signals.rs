@@ -324,9 +324,9 @@ fn what_was_finished_is_not_replaced_by_what_was_interrupted() {
 fn a_render_without_layers_keeps_its_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
     let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} -o a.png", scene()));
-    running.until_there_is("scene.partial.exr");
+    running.until_there_is("a.partial.exr");
     running.send(&["INT"]);
-    complains(&running.end(), 130, &["a.png", "--resume scene.partial.exr"]);
-    assert_eq!(names(folder.path()), ["a.png", "scene.partial.exr"]);
-    image::write(&folder.path().join("x.exr"), &film(&folder, "scene.partial.exr"), &WriteOptions::default()).unwrap();
+    complains(&running.end(), 130, &["a.png", "--resume a.partial.exr"]);
+    assert_eq!(names(folder.path()), ["a.partial.exr", "a.png"]);
+    image::write(&folder.path().join("x.exr"), &film(&folder, "a.partial.exr"), &WriteOptions::default()).unwrap();
 }

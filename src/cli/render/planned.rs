@@ -26,9 +26,14 @@ fn target(args: &Args) -> Option<Target> {
     time.or(args.error.map(Target::RelMse))
 }
 
+/// Whether this run makes the plan, by a probe.
+pub fn is_made(args: &Args) -> bool {
+    target(args).is_some()
+}
+
 /// Where the plan goes that this run makes.
 pub fn to_write(args: &Args) -> Option<&Path> {
-    args.plan.as_deref().filter(|_| target(args).is_some())
+    args.plan.as_deref().filter(|_| is_made(args))
 }
 
 /// The plan that is to be followed, if one is.
@@ -36,7 +41,7 @@ pub fn to_write(args: &Args) -> Option<&Path> {
 /// # Errors
 /// [`Error::Input`] for a file that is no plan, or one of another version.
 pub fn read(args: &Args) -> Result<Option<Plan>> {
-    let Some(path) = args.plan.as_deref().filter(|_| target(args).is_none()) else { return Ok(None) };
+    let Some(path) = args.plan.as_deref().filter(|_| !is_made(args)) else { return Ok(None) };
     let text = input::read_text(path, BYTES_OF_JSON)?;
     let wrong = |what: String| Error::input(path, what);
     let text = String::from_utf8(text).map_err(|_| wrong("is no text, and no plan".to_owned()))?;

@@ -24,11 +24,22 @@ impl Spans {
     /// What the stages of a name took.
     pub fn seconds(&self, name: &str) -> f64 {
         let spans = self.0.iter().filter(|s| s.name == name);
-        spans.map(|s| s.duration_ns() as f64 * 1e-9).sum()
+        spans.map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-9
     }
 
     /// A file of them beside the passes on the device.
     pub fn item(&self, path: &Path, gpu: &Gpu, passes: &[PassTime]) -> Item<'static> {
         Item::bytes(path.to_owned(), chrome_trace(&self.0, passes, gpu.calibrate()).into_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sum of no floats is -0, which JSON shows.
+    #[test]
+    fn what_was_not_done_took_no_time() {
+        assert!(Spans::default().seconds("denoise").is_sign_positive());
     }
 }

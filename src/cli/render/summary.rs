@@ -1,5 +1,6 @@
 //! What is said of a render at its end.
-use super::Spans;
+use super::{Args, Spans, planned};
+use crate::cli::readable;
 use crate::gpu::{Gpu, total_ms};
 use crate::image::Film;
 use crate::plan::Plan;
@@ -112,7 +113,7 @@ impl Outcome<'_> {
 }
 
 /// In words.
-pub fn text(s: &Summary) -> String {
+pub fn text(args: &Args, s: &Summary) -> String {
     let speed = s.traced as f64 * 1e-6 / s.seconds.max(1e-9);
     let filtered =
         if s.filter_seconds > 0.0 { format!(", filtered in {:.2} s", s.filter_seconds) } else { String::new() };
@@ -124,7 +125,7 @@ pub fn text(s: &Summary) -> String {
         let mean = s.samples as f64 / (f64::from(s.width) * f64::from(s.height));
         text += &format!("{} to {} samples per pixel, {mean:.2} on average\n", s.least_samples, s.most_samples);
     }
-    text += &s.plan.as_ref().map_or_else(String::new, |plan| plan_lines(plan, s.gpu_ms));
+    text += &s.plan.as_ref().map_or_else(String::new, |plan| plan_lines(args, plan, s.gpu_ms));
     text += &stop_line(s.stopped);
     if s.broken_priorities > 0 {
         text += &format!("warning: {} priorities were not finite and counted for nothing\n", s.broken_priorities);
@@ -134,13 +135,21 @@ pub fn text(s: &Summary) -> String {
         text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
     }
     text += &s.notes.iter().map(|note| note.clone() + "\n").collect::<String>();
-    text + &table::timing_table(&s.passes)
+    text += &table::timing_table(&s.passes);
+    // Of an interruption the last line on stderr tells.
+    if s.stopped != StopReason::Interrupted && !s.files.is_empty() {
+        let files: Vec<_> = s.files.iter().map(|name| readable(name)).collect();
+        text += &format!("written: {}\n", files.join(", "));
+    }
+    text
 }
 
 /// What was planned, and what came of it.
-fn plan_lines(plan: &Plan, took: f64) -> String {
+fn plan_lines(args: &Args, plan: &Plan, took: f64) -> String {
     let reasons: String = plan.reasons().into_iter().map(|line| line + "\n").collect();
-    format!("{reasons}it took {took:.1} ms of GPU time\n")
+    let probe =
+        if planned::is_made(args) { format!(", and the probe before {:.1} ms", plan.probe_ms) } else { String::new() };
+    format!("{reasons}it took {took:.1} ms of GPU time{probe}\n")
 }
 
 /// What is worth saying of why it ended, with a line break; nothing when all went as planned. An interruption is told when it
