@@ -305,3 +305,19 @@ fn a_lamp_that_shines_from_behind_is_as_clear_as_from_its_front() {
         assert!(behind.1 < 1.2 * front.1 && front.1 < 1.2 * behind.1, "{front:?}, {behind:?}: {size}");
     }
 }
+
+/// Every sample meets the sun by its shadow ray, and the sky where the path leaves the scene.
+#[test]
+fn sun_and_sky_of_one_colour_leave_no_noise_on_open_ground() {
+    let scene = Workplace::new().scene(
+        "[film]\nwidth = 8\nheight = 8\n[camera]\nposition = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 10.0\n\
+         [render]\nspp = 1\nmax_depth = 2\n[environment]\nradiance = 0.5\n[[light]]\ntype = 'directional'\n\
+         direction = [0.0, -0.6, -0.8]\nirradiance = 3.0\n[[material]]\nname = 'ground'\ncolor = 0.5\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'ground'\n",
+    );
+    let expected = 0.5 * (0.5 + 3.0 * 0.8 / PI);
+    for (i, pixel) in rendered(&scene).iter().enumerate() {
+        let found = f64::from(pixel.mean[0]);
+        assert!((found / expected - 1.0).abs() < 1e-5, "pixel {i}: {found}, expected {expected}");
+    }
+}

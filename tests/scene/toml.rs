@@ -202,6 +202,21 @@ fn neither_lamps_nor_lights_at_infinity_are_chosen_by_hardly_any_sample() {
 }
 
 #[test]
+fn a_sky_of_one_colour_beside_suns_alone_is_left_to_bsdf_sampling() {
+    let chances = |sun: f32, more: &str| {
+        let sun = format!("[[light]]\ntype = \"directional\"\ndirection = [0, 0, -1]\nirradiance = {sun}\n");
+        let ground = "[camera]\nposition = [0, 0, 5]\n[[mesh]]\nshape = \"rectangle\"\n[environment]\nradiance = 0.1\n";
+        let scene = parse(&format!("{ground}{sun}{more}")).unwrap();
+        [LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT]
+            .map(|kind| scene.lights.iter().find(|l| l.kind == kind).map(|l| l.probability))
+    };
+    assert_eq!(chances(1.0, ""), [Some(1.0), Some(0.0)]);
+    assert_eq!(chances(0.0, ""), [None, Some(1.0)], "a sun that is dark");
+    let lamp = "[[light]]\ntype = \"point\"\nposition = [0, 0, 1]\nintensity = 1\n";
+    assert!(chances(1.0, lamp)[1] > Some(0.0), "control: beside a lamp");
+}
+
+#[test]
 fn a_smooth_pane_that_stops_a_lamp_without_extent_is_named() {
     let told = |more: &str| {
         let pane =

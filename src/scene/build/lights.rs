@@ -1,5 +1,5 @@
 //! The list of lights and the table that chooses one in proportion to its power, delta lights [`DELTA_WEIGHT`] times as often, those at
-//! infinity and the others at least [`LEAST_SHARE`] of the time each.
+//! infinity and the others at least [`LEAST_SHARE`] of the time each. Beside suns alone, a sky of one colour is not chosen.
 //!
 //! Power, by luminance, in watts up to a common factor: emissive triangle or sphere `pi * area * L` (L the mean over its texture
 //! times the mean opacity, twice that where both sides shine), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
@@ -95,11 +95,12 @@ pub fn list(scene: &mut Scene) -> Result<()> {
     add_triangles(scene, &mut lights, &mut numbers)?;
     drop_copies(scene.rig.lights.len(), &mut lights, &mut numbers);
     let mut powers: Vec<f64> = lights.iter().map(|l| weight(l) * power(scene, l)).collect();
-    share(&lights, &mut powers);
     let (mut kept, mut named) = (powers.iter(), powers.iter());
     lights.retain(|_| kept.next().is_some_and(|&p| p > 0.0));
     numbers.retain(|_| named.next().is_some_and(|&p| p > 0.0));
     powers.retain(|&p| p > 0.0);
+    leave_sky(scene, &lights, &mut powers);
+    share(&lights, &mut powers);
     let total: f64 = powers.iter().sum();
     scene.triangle_pdf_scale = if total > 0.0 { (PI * unit(scene) / total) as f32 } else { 0.0 };
     scene.light_table = alias::build(&powers);
@@ -244,6 +245,15 @@ const DELTA_WEIGHT: f64 = 8.0;
 
 fn weight(light: &Light) -> f64 {
     if light.is_delta() { DELTA_WEIGHT } else { 1.0 }
+}
+
+/// Leaves a sky of one colour to BSDF sampling where suns alone shine beside it. A path that leaves the scene finds such a sky as well as
+/// light sampling does, and every light sample then chooses a sun, whose light would have the noise of that choice otherwise.
+fn leave_sky(scene: &Scene, lights: &[Light], weights: &mut [f64]) {
+    let is_sun = |l: &Light| l.kind == LIGHT_DIRECTIONAL;
+    if scene.environment.is_none() && lights.iter().any(is_sun) && lights.iter().all(Light::is_far) {
+        lights.iter().zip(weights).filter(|(l, _)| !is_sun(l)).for_each(|(_, w)| *w = 0.0);
+    }
 }
 
 /// Least share of the choices that lights at infinity get beside those in the scene, and these beside them. Measured at 64 samples a pixel
