@@ -2,7 +2,6 @@
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
 #include "shared/frame.glsl"
-#include "shared/finite.glsl"
 #include "shared/luminance.glsl"
 
 // Starts each pixel of a new frame with samples of the last, or with none, from the new pixel's side (backward reprojection): finds
@@ -25,7 +24,6 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/history.glsl"
 #include "shared/whole_pixel.glsl"
 #include "shared/probe_cell.glsl"
-#include "shared/light_around.glsl"
 #include "shared/held.glsl"
 
 // Steps towards where a point was on the last film. Where nothing but the camera moves the first place is exact.
@@ -59,7 +57,6 @@ void merge(inout Merged m, uint from, Carried c, float weight) {
     m.squares += weight * weight * count;
     m.weight += weight;
     m.c.age = max(m.c.age, c.age + 1u);
-    m.c.error = max(m.c.error, c.error);
 }
 
 // Where on the last film the point was that a pixel shows now; z as of film_from_point. What the pixels of the last frame show has
@@ -79,7 +76,7 @@ vec3 was_at(Surface s, vec2 centre) {
 }
 
 // Why a pixel cannot take samples of an old one, or 0: those are what `c` says then.
-uint reason_to_leave(uint pixel, uint from, bool edge, uint parts, inout Carried c) {
+uint reason_to_leave(uint pixel, uint from, bool edge, float view, inout Carried c) {
     if (c.edge != edge) return DROPPED_HIDDEN;
     Surface s = surface_of(History_triangle(history, from), History_instance(history, from), History_weights(history, from));
     if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0) || !shows(pixel, s)) return DROPPED_HIDDEN;
@@ -88,8 +85,8 @@ uint reason_to_leave(uint pixel, uint from, bool edge, uint parts, inout Carried
         c.count = worth(c.count, light * light);
         if (c.count == 0u) return DROPPED_LIGHT;
     }
-    c.error += parts;
-    return c.error > ERROR_PARTS ? DROPPED_VIEW : 0u;
+    c.count = worth_in_view(c.count, view, from);
+    return c.count == 0u ? DROPPED_VIEW : 0u;
 }
 
 // What a pixel takes of the four around a point of the last film; or why none, in its word.
@@ -102,17 +99,15 @@ uint take(uint pixel, inout Merged m) {
     vec3 film = was_at(s, vec2(pixel % push.size.x, pixel / push.size.x) + 0.5);
     if (!(film.z > 0.0 && finite(film))) return dropped(DROPPED_OUTSIDE);
     vec2 at = clamp(film.xy, vec2(-2.0), vec2(size) + 2.0) - 0.5, low = floor(at);
-    ivec2 nearest = clamp(ivec2(floor(at + 0.5)), ivec2(0), size - 1);
-    float view = view_change(s, uint(nearest.y * size.x + nearest.x));
-    if (!(view <= 1.0)) return dropped(DROPPED_VIEW);
-    uint parts = uint(ceil(view * float(ERROR_PARTS))), reason = DROPPED_OUTSIDE;
+    float view = view_change(s);
+    uint reason = DROPPED_OUTSIDE;
     for (int k = 0; k < 4; k++) {
         ivec2 q = ivec2(low) + ivec2(k & 1, k >> 1);
         if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, size))) continue;
         uint from = uint(q.y * size.x + q.x);
         vec2 share = 1.0 - abs(at - vec2(q));
         Carried c = carried_of(texelFetch(offered, int(from)).x);
-        uint why = c.count > 0u ? reason_to_leave(pixel, from, edge, parts, c) : c.age > 0u ? DROPPED_HIDDEN : 0u;
+        uint why = c.count > 0u ? reason_to_leave(pixel, from, edge, view, c) : c.age > 0u ? DROPPED_HIDDEN : 0u;
         float weight = share.x * share.y;
         if (why == 0u && c.count > 0u && weight > 0.0) merge(m, from, c, weight);
         if (reason != 0u) reason = why;

@@ -2,11 +2,10 @@
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
 #include "shared/frame.glsl"
-#include "shared/finite.glsl"
 
 // Finds for each pixel of the last frame the point of the new film that its samples' point has moved to (forward reprojection,
-// Schalk 2018, 3.2), and offers its samples to the four pixels around, where those show the same surface and the light towards the
-// new view differs little. Where something else has moved, points have moved with it, and what has become of their light is known
+// Schalk 2018, 3.2), and offers its samples to the four pixels around, where those show the same surface, fewer of them where the light
+// towards the new view differs. Where something else has moved, points have moved with it, and what has become of their light is known
 // from probes: as if the scene changed first, before the last camera, and then the camera moved.
 //
 // Of several offers the one nearest to the pixel's centre wins, then that of the lowest old pixel: an atomic minimum of integers,
@@ -29,7 +28,6 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/surface_point.glsl"
 #include "shared/history.glsl"
 #include "shared/probe_cell.glsl"
-#include "shared/light_around.glsl"
 #include "shared/held.glsl"
 
 // Offers the samples of a pixel to those around `film`, a point of the film, of an edge to edges alone. Returns why none takes them,
@@ -61,13 +59,11 @@ uint moved(uint pixel, Carried c) {
         c.count = worth(c.count, light * light);
         if (c.count == 0u) return dropped(DROPPED_LIGHT);
     }
-    float view = view_change(s, pixel);
-    bool small = view <= 1.0;
-    c.error += small ? uint(ceil(view * float(ERROR_PARTS))) : 0u;
-    if (!small || c.error > ERROR_PARTS) return dropped(DROPPED_VIEW);
+    c.count = worth_in_view(c.count, view_change(s), pixel);
+    if (c.count == 0u) return dropped(DROPPED_VIEW);
     vec3 film = film_from_point(camera, s.position, push.size);
     uint reason = film.z > 0.0 && finite(film) ? offer(pixel, s, film.xy, c.edge, c.count < push.spp) : DROPPED_OUTSIDE;
-    return reason == 0u ? word_of(Carried(c.count, c.age + 1u, c.error, c.edge, c.back)) : dropped(reason);
+    return reason == 0u ? word_of(Carried(c.count, c.age + 1u, c.edge, c.back)) : dropped(reason);
 }
 
 void main() {

@@ -79,12 +79,17 @@ const float SURE_SPREAD = 1.5;
 const float LEAST_SPREAD = 1.52587890625e-5; // 2^-16: of the square of a pixel's radiance, a difference of 1/256 is let be
 const int NEAR = 18; // the squares of nine pixels, and of nine that lie two apart
 
+const float UNKNOWN_NOISE = 1e15; // so much that no change of the view matters
+
 // How many of the samples of a pixel are worth handing on by what the means of pixels around differ by, beyond their noise. New
 // samples are stratified within the pixel, where they take in without noise what varies so: only what else is in the variance of one
 // counts. Away from edges other surfaces do not.
-uint kept_by_spread(uint pixel, vec3 plane, uint count, bool edge) {
+// `noise` is that of History_noise: of the other pixels alone, since with the pixel's own, bright samples would go and dark ones stay.
+uint kept_by_spread(uint pixel, vec3 plane, uint count, bool edge, out float noise) {
     ivec2 size = ivec2(push.size), at = ivec2(pixel % push.size.x, pixel / push.size.x);
     vec3 sum = vec3(0.0), origin = PixelStats_mean(stats, pixel);
+    vec3 beside = vec3(0.0); // sum of the others' means
+    vec3 others = vec3(0.0); // squared deviations, degrees of freedom, number
     float squares = 0.0, within = 0.0, degrees = 0.0, inverse = 0.0, n = 0.0, width = pixel_width(previous, push.size);
     for (int k = 0; k < NEAR; k++) {
         ivec2 q = clamp(at + (k < 9 ? 1 : 2) * ivec2(k % 3 - 1, k % 9 / 3 - 1), ivec2(0), size - 1);
@@ -95,33 +100,39 @@ uint kept_by_spread(uint pixel, vec3 plane, uint count, bool edge) {
         n += 1.0;
         sum += off;
         squares += dot(off, off);
-        within += s.m2.r + s.m2.g + s.m2.b;
-        degrees += float(max(s.count, 1u) - 1u);
+        vec3 own = vec3(s.m2.r + s.m2.g + s.m2.b, float(max(s.count, 1u) - 1u), 1.0);
+        within += own.x;
+        degrees += own.y;
+        if (DEPENDS_ON_VIEW && other != pixel) {
+            beside += s.mean;
+            others += own;
+        }
         inverse += 1.0 / float(max(s.count, 1u));
     }
     float variance = within / max(degrees, 1.0), spread = (squares - dot(sum, sum) / n) / (n - 1.0);
     float beyond = max(spread - SURE_SPREAD * variance * inverse / n - LEAST_SPREAD * dot(origin, origin), 0.0);
     // Single samples do not tell their noise.
+    noise = others.y > 0.0 ? others.x / others.y * others.z * others.z / max(dot(beside, beside), 1e-30) : UNKNOWN_NOISE;
     return degrees > 0.0 ? worth(count, (edge ? SHARE_AT_EDGE : SHARE_OF_SPREAD) * beyond / max(variance - beyond, 1e-30)) : count;
 }
 
 // 0 where the pixel's samples may move: so many, of that side of the surface, of an edge or not.
-uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c) {
+uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c, out float noise) {
+    noise = UNKNOWN_NOISE;
     if (at.triangle == NONE) return DROPPED_SKY;
     Surface s = surface_of(at);
     c.back = dot(s.geometric, previous.position - s.position) < 0.0;
     if (is_sharp(surface_bsdf(s))) return DROPPED_SPECULAR;
     c.edge = !is_whole(pixel, s.geometric, pixel_width(previous, push.size));
-    c.count = min(kept_by_spread(pixel, s.geometric, c.count, c.edge), kept_of_edge(pixel, s.geometric, c.count, c.edge));
+    c.count = min(kept_by_spread(pixel, s.geometric, c.count, c.edge, noise), kept_of_edge(pixel, s.geometric, c.count, c.edge));
     return c.count > 0u ? 0u : DROPPED_EDGE;
 }
 
-// What is known of all samples of a pixel, of which it had c.count at the start of the frame. Their age and their error are the means of
-// theirs: new ones have none, and the error is that of the mean of all. Where the age is at the limit fewer count, so that new ones keep
-// it there: were all dropped at once, a whole film would begin anew in one frame.
+// What is known of all samples of a pixel, of which it had c.count at the start of the frame. Their age is the mean of theirs, and new
+// ones have none. Where it is at the limit fewer count, so that new ones keep it there: were all dropped at once, a whole film would
+// begin anew in one frame.
 Carried older(Carried c, uint count, bool still) {
     uint age = (c.age * c.count + count / 2u) / max(count, 1u);
-    c.error = (c.error * c.count + max(count, 1u) - 1u) / max(count, 1u); // rounded up, as everywhere
     c.count = min(count, still ? MOST_CARRIED : push.max_samples);
     bool old = !still && age >= push.max_age;
     c.count = old ? c.count * push.max_age / (age + 1u) : c.count;
@@ -144,11 +155,12 @@ void main() {
     PixelStats s = PixelStats_load(stats, pixel);
     SurfacePoint at = SurfacePoint_load(points, pixel);
     Carried c = carried_of(carried[pixel]);
-    // A pixel that took nothing has samples of age and error 0, whatever its word says of why.
+    // A pixel that took nothing has samples of age 0, whatever its word says of why.
     if (c.count == 0u) c = carried_of(0u);
     c = older(c, s.count, still);
     c.edge = c.back = false;
-    uint reason = still || s.count == 0u ? 0u : c.count == 0u ? DROPPED_OLD : reason_to_keep(pixel, at, c);
+    float noise = UNKNOWN_NOISE;
+    uint reason = still || s.count == 0u ? 0u : c.count == 0u ? DROPPED_OLD : reason_to_keep(pixel, at, c, noise);
     offered[i] = reason == 0u ? word_of(c) : dropped(reason);
     at = numbered_anew(at);
     // Where nothing moves sums are handed on as they are, but for samples that MOST_CARRIED leaves out.
@@ -159,6 +171,7 @@ void main() {
     h.weights = at.weights;
     h.mean = s.mean;
     h.variance = s.m2 * share / divisor;
+    h.noise = noise;
     history[i] = History_words(h);
     if (FX_SPLIT) {
         PixelLight l = PixelLight_load(light, pixel);

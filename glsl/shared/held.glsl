@@ -1,10 +1,8 @@
-// Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, light_around.glsl, and before them `previous`,
+// Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, and before them `previous`,
 // `guide` (of the new frame), `history` and `push` (ReprojectPush).
 
 // A hit is of the surface of a point if it lies no farther from the plane there than this, in widths of a pixel.
 const float PLANE_DISTANCE = 0.5;
-// An albedo below this does not make more of the light that arrives: the quotient would only show noise.
-const float LEAST_ALBEDO = 0.05;
 
 bool shows(uint pixel, Surface s) {
     float off = abs(dot(s.geometric, Guide_position(guide, pixel) - s.position));
@@ -20,30 +18,26 @@ vec3 scattered(Surface s, Bsdf bsdf, vec3 wo, vec3 wi) {
     return bsdf_evaluate(bsdf, view.wo, from).rgb / max(from.z, 1e-3);
 }
 
-// Largest channel of |f_r(new view) - f_r(old view)| * irradiance (Schalk 2018, equation 15, where the albedo is a factor of its
-// own). The direction that light comes from is not kept: it is taken to be the worst of the mirror images of the two views,
-// where a lobe is largest.
-float view_error(Surface s, uint pixel, vec3 before, vec3 after) {
+// Square of the share by which the changed view may move a surface's light. The direction that light comes from is not kept: at worst it
+// is on the flank of a lobe, where as a share of the peak radiance changes by the square root of what the peak loses, nearly: the peak of
+// GGX (1 + x^2)^-2 loses 2 x^2 over an angle x, and its steepest flank 1.04 x. The peaks are at the mirror images of both views.
+// Departure from Schalk 2018, equation 15, where peaks change by so much times the irradiance, of which only noise tells.
+float view_change(Surface s) {
+    if (!DEPENDS_ON_VIEW) return 0.0;
     Bsdf bsdf = surface_bsdf(s);
     if (!bsdf_is_specular(bsdf)) return 0.0;
-    float side = dot(s.normal, before) < 0.0 ? -1.0 : 1.0;
-    vec3 irradiance = PI * light_around(pixel, push.size) / max(bsdf_albedo(bsdf, abs(dot(s.normal, before))), vec3(LEAST_ALBEDO));
-    float error = 0.0;
+    vec3 before = normalize(previous.position - s.position), after = normalize(camera.position - s.position);
+    float side = dot(s.normal, before) < 0.0 ? -1.0 : 1.0, change = 0.0;
     for (int k = 0; k < 2; k++) {
         vec3 from = mirror(k == 0 ? before : after, side * s.normal);
-        vec3 change = abs(scattered(s, bsdf, after, from) - scattered(s, bsdf, before, from)) * irradiance;
-        error = max(error, max(change.r, max(change.g, change.b)));
+        vec3 a = scattered(s, bsdf, before, from), b = scattered(s, bsdf, after, from);
+        vec3 share = abs(b - a) / max(max(a, b), vec3(1e-30));
+        change = max(change, max(share.r, max(share.g, share.b)));
     }
-    return error;
+    return change;
 }
 
-// Lambertian reflection alone is the same in every direction.
-const bool DEPENDS_ON_VIEW = !ONE_KIND || !FX_DIFFUSE;
-
-// By how much the changed view moves the light of a surface, whose samples in the last frame are around `pixel`: in shares of what is
-// allowed.
-float view_change(Surface s, uint pixel) {
-    if (!DEPENDS_ON_VIEW) return 0.0;
-    vec3 before = normalize(previous.position - s.position), after = normalize(camera.position - s.position);
-    return view_error(s, pixel, before, after) / max(push.max_error, 1e-30);
+// How many of `count` samples of a pixel of the last frame are worth handing on after that change, beside their noise.
+uint worth_in_view(uint count, float change, uint pixel) {
+    return worth(count, change / max(push.view * push.view * History_noise(history, pixel), 1e-30));
 }

@@ -1,6 +1,9 @@
 // Points of surfaces as they are kept from frame to frame.
 #include "shared/surface.glsl"
 
+// Lambertian reflection alone is the same in every direction.
+const bool DEPENDS_ON_VIEW = !ONE_KIND || !FX_DIFFUSE;
+
 Surface surface_of(uint triangle, uint instance, vec2 weights) {
     return surface_at(Hit(0.0, triangle, instance, weights.x, weights.y));
 }

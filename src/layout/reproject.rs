@@ -27,8 +27,11 @@ gpu_structs! {
         mean: vec3,
         /// Variance of one sample; where nothing has moved, as [`PixelStats::m2`].
         variance: vec3,
+        /// Variance of one sample of the pixels around, sum of the channels, as a share of the square of their mean radiance: 1e15 where
+        /// it is unknown, or not asked for.
+        noise: float,
         /// Unused.
-        pad: uvec2,
+        pad: uint,
     }
 
     /// The light of a [`History`], where direct and indirect light are kept apart. 2 texels.
@@ -51,8 +54,8 @@ gpu_structs! {
         first_pixel: uint,
         /// Pixels of the dispatch.
         pixels: uint,
-        /// Largest error by changed view that carried samples may have, W/(m^2 sr).
-        max_error: float,
+        /// Change of light by the view, as a share of the deviation of one sample, that counts as much as it.
+        view: float,
         /// Change of light, as a share of it, that counts as much as the deviation of one sample.
         noise: float,
         /// Largest distance of a neighbour's first hit from the plane of the pixel's own, in widths of the pixel there.

@@ -9,8 +9,6 @@ pub struct Carried {
     pub count: u32,
     /// How many times they have moved, on average.
     pub age: u32,
-    /// Error that they are accounted, in 63rds of the largest one.
-    pub error: u32,
     /// Whether they are of an edge: of several surfaces.
     pub edge: bool,
     /// Whether they show the side of the surface that its triangle's normal points away from.
@@ -20,13 +18,7 @@ pub struct Carried {
 impl Carried {
     /// Out of a word.
     pub fn of(word: u32) -> Self {
-        Self {
-            count: word & 0xffff,
-            age: (word >> 16) & 0xff,
-            error: (word >> 24) & 0x3f,
-            edge: word >> 30 & 1 != 0,
-            back: word >> 31 != 0,
-        }
+        Self { count: word & 0xffff, age: (word >> 16) & 0xff, edge: word >> 24 & 1 != 0, back: word >> 25 & 1 != 0 }
     }
 
     /// Of a pixel of [`History::carried`], where a word without samples may say why.
@@ -37,7 +29,7 @@ impl Carried {
 
     /// As a word.
     pub fn word(self) -> u32 {
-        self.count | self.age << 16 | self.error << 24 | u32::from(self.edge) << 30 | u32::from(self.back) << 31
+        self.count | self.age << 16 | u32::from(self.edge) << 24 | u32::from(self.back) << 25
     }
 }
 
@@ -71,7 +63,7 @@ pub struct Carriage {
     pub outside: u64,
     /// Those whose point is hidden in the new frame.
     pub hidden: u64,
-    /// Those that would look different from the new view.
+    /// Those that look so different from the new view that no sample is worth handing on.
     pub view: u64,
     /// Those whose light has changed.
     pub light: u64,

@@ -6,14 +6,12 @@ use crate::image::{Film, Samples};
 use crate::layout::{NONE, SurfacePoint};
 use crate::render::carriage::Carried;
 use crate::scene::Scene;
-use crate::shaders::shared::history::{ERROR_PARTS, MOST_CARRIED};
+use crate::shaders::shared::history::MOST_CARRIED;
 
 /// Samples of a pixel that are of earlier frames.
 const SAMPLES: &str = "carried.samples";
 /// Frames that they were carried through.
 const AGE: &str = "carried.age";
-/// Error that they are accounted, as a share of the largest one that they may have.
-const ERROR: &str = "carried.error";
 /// The point that a pixel's samples are of: numbers that no pose changes, and weights of the triangle's vertices 1 and 2.
 const POINT: [&str; 4] = ["point.triangle", "point.instance", "point.u", "point.v"];
 
@@ -28,7 +26,6 @@ impl Renderer {
         let carried: Vec<_> = history.carried.read()?.into_iter().map(Carried::of_pixel).collect();
         film.add(SAMPLES, Samples::U32(carried.iter().map(|c| c.count).collect()));
         film.add(AGE, Samples::U32(carried.iter().map(|c| c.age).collect()));
-        film.add(ERROR, Samples::F32(carried.iter().map(|c| c.error as f32 / ERROR_PARTS as f32).collect()));
         let points = self.frame.film.tiles[0].points.read()?;
         let of = |numbers: Vec<u32>, index: fn(&SurfacePoint) -> u32| {
             let number = |p| numbers.get(index(p) as usize).copied().unwrap_or(NONE);
@@ -55,15 +52,10 @@ impl Renderer {
         let lacks = |what: String| Error::Usage(format!("the frame before {what}"));
         let pixels = film::pixels(film).map_err(lacks)?;
         let [samples, age] = [SAMPLES, AGE].map(|name| film::counts(film, name).map_err(lacks));
-        let (samples, age, error) = (samples?, age?, floats(film, ERROR)?);
+        let (samples, age) = (samples?, age?);
         // Numbers of a damaged file stay within their bits.
-        let word = |i: usize| Carried {
-            count: samples[i].min(MOST_CARRIED),
-            age: age[i].min(255),
-            error: ((error[i] * ERROR_PARTS as f32).round() as u32).min(ERROR_PARTS),
-            edge: false,
-            back: false,
-        };
+        let word =
+            |i: usize| Carried { count: samples[i].min(MOST_CARRIED), age: age[i].min(255), edge: false, back: false };
         let points = points(film, scene)?;
         self.run(frame, &Step::Start)?;
         let tile = &self.frame.film.tiles[0];

@@ -21,7 +21,6 @@ struct Merged {
     squares: f32,
     weight: f32,
     age: u32,
-    error: u32,
 }
 
 fn towards(mean: [f32; 3], other: [f32; 3], part: f32) -> [f32; 3] {
@@ -48,7 +47,7 @@ impl Merged {
         self.samples = samples;
         self.squares += weight * weight * count;
         self.weight += weight;
-        (self.age, self.error) = (self.age.max(c.age + 1), self.error.max(c.error));
+        self.age = self.age.max(c.age + 1);
     }
 
     fn finish(mut self, edge: bool) -> Begun {
@@ -57,7 +56,7 @@ impl Merged {
         self.stats.count = count;
         self.stats.m2 = self.stats.m2.map(|m2| (m2 * scale).min(MOST_M2));
         self.light.indirect_m2 = (self.light.indirect_m2 * scale).min(MOST_M2);
-        (Carried { count, age: self.age, error: self.error, edge, back: false }.word(), self.stats, self.light)
+        (Carried { count, age: self.age, edge, back: false }.word(), self.stats, self.light)
     }
 }
 
@@ -97,7 +96,15 @@ impl Reprojection<'_> {
         at
     }
 
-    fn reason_to_leave(&self, handed: &Handed, seen: &Guide, from: usize, edge: bool, c: &mut Carried) -> u32 {
+    fn reason_to_leave(
+        &self,
+        handed: &Handed,
+        seen: &Guide,
+        from: usize,
+        edge: bool,
+        view: f32,
+        c: &mut Carried,
+    ) -> u32 {
         if c.edge != edge {
             return DROPPED_HIDDEN;
         }
@@ -108,11 +115,11 @@ impl Reprojection<'_> {
             return DROPPED_HIDDEN;
         }
         c.count = self.after_change(from, c.count);
-        match c.count {
-            0 => DROPPED_LIGHT,
-            _ if c.error > ERROR_PARTS => DROPPED_VIEW,
-            _ => 0,
+        if c.count == 0 {
+            return DROPPED_LIGHT;
         }
+        c.count = self.worth_in_view(c.count, view, h);
+        if c.count == 0 { DROPPED_VIEW } else { 0 }
     }
 
     /// What a pixel takes, or its word with why it takes nothing.
@@ -129,11 +136,7 @@ impl Reprojection<'_> {
             return Err(dropped(DROPPED_OUTSIDE));
         }
         let at = film.truncate().clamp(Vec2::splat(-2.0), size.as_vec2() + 2.0) - 0.5;
-        let nearest = (at + 0.5).floor().as_ivec2().clamp(corner, size - 1);
-        let view = self.view_change(&handed.records, &s, (nearest.y * size.x + nearest.x) as usize);
-        if view.is_nan() || view > 1.0 {
-            return Err(dropped(DROPPED_VIEW));
-        }
+        let view = self.view_change(&s);
         let (mut reason, mut merged) = (DROPPED_OUTSIDE, Merged::default());
         for k in 0..4 {
             let q = at.floor().as_ivec2() + ivec2(k & 1, k >> 1);
@@ -145,10 +148,7 @@ impl Reprojection<'_> {
             let why = match c.count {
                 0 if c.age > 0 => DROPPED_HIDDEN,
                 0 => 0,
-                _ => {
-                    c.error += (view * ERROR_PARTS as f32).ceil() as u32;
-                    self.reason_to_leave(handed, &guide[pixel], from, edge, &mut c)
-                }
+                _ => self.reason_to_leave(handed, &guide[pixel], from, edge, view, &mut c),
             };
             if why == 0 && c.count > 0 && weight > 0.0 {
                 merged.add(handed, from, c, weight);

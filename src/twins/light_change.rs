@@ -60,7 +60,7 @@ pub(super) fn square(pixel: usize, [width, height]: [u32; 2]) -> impl Iterator<I
 }
 
 /// Mean radiance of the 3x3 pixels of the last frame around one.
-pub(super) fn light_around(records: &[History], pixel: usize, size: [u32; 2]) -> Vec3 {
+fn light_around(records: &[History], pixel: usize, size: [u32; 2]) -> Vec3 {
     square(pixel, size).map(|q| Vec3::from(records[q].mean)).sum::<Vec3>() / 9.0
 }
 

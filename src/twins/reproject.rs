@@ -6,16 +6,17 @@ use crate::layout::{
 pub use crate::render::Carried;
 use crate::scene::Scene;
 use crate::shaders::project::FARTHEST_OF_FEW;
-use crate::shaders::remember::{LEAST_SPREAD, NEAR, SHARE_AT_EDGE, SHARE_OF_SPREAD, SURE_SPREAD, VARIANCE_OF_MOVE};
-use crate::shaders::shared::held::{LEAST_ALBEDO, PLANE_DISTANCE};
+use crate::shaders::remember::{
+    LEAST_SPREAD, NEAR, SHARE_AT_EDGE, SHARE_OF_SPREAD, SURE_SPREAD, UNKNOWN_NOISE, VARIANCE_OF_MOVE,
+};
+use crate::shaders::shared::held::PLANE_DISTANCE;
 use crate::shaders::shared::history::*;
-use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_albedo, bsdf_evaluate, bsdf_is_specular};
+use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
-use crate::twins::light_change::{light_around, probe_cell_of, square};
+use crate::twins::light_change::{probe_cell_of, square};
 use crate::twins::surface::{Surface, facing_normals, surface_at, surface_bsdf, view_of};
 use crate::twins::traverse::Hit;
 use glam::{Vec2, Vec3, Vec4, vec2};
-use std::f32::consts::PI;
 
 pub(super) fn dropped(reason: u32) -> u32 {
     reason << 16
@@ -76,7 +77,8 @@ pub(super) fn freedom(count: u32) -> f32 {
 /// How many new samples have a mean as far from the truth as that of `count` after a change, whose square is `change` times the
 /// variance of one sample.
 fn worth(count: u32, change: f32) -> u32 {
-    (count as f32 / (1.0 + count as f32 * change) + 0.5) as u32
+    let samples = count as f32 / (1.0 + count as f32 * change);
+    if change.is_finite() { ((samples + 0.5) as u32).min(count) } else { 0 }
 }
 
 pub(super) fn surface_of(scene: &Scene, triangle: u32, instance: u32, weights: [f32; 2]) -> Surface {
@@ -170,8 +172,23 @@ impl Reprojection<'_> {
         if degrees > 0.0 { worth(count, share * beyond / (variance - beyond).max(1e-30)) } else { count }
     }
 
+    /// The noise of the pixels around one, as [`History::noise`].
+    fn noise_around(&self, left: &Left, pixel: usize, plane: Vec3, edge: bool) -> f32 {
+        let width = pixel_width(&self.previous, self.push.size);
+        let same = |q: usize| self.shows_same([&left.guide[pixel], &left.guide[q]], plane, width);
+        let near = self.near(pixel).enumerate().filter(|&(k, q)| q != pixel && (edge || k < 9 || same(q)));
+        let (mut mean, mut within, mut degrees, mut n) = (Vec3::ZERO, 0.0, 0.0, 0.0);
+        for s in near.map(|(_, q)| &left.stats[q]) {
+            mean += Vec3::from(s.mean);
+            within += s.m2.iter().sum::<f32>();
+            degrees += s.count.saturating_sub(1) as f32;
+            n += 1.0;
+        }
+        if degrees > 0.0 { within / degrees * n * n / mean.length_squared().max(1e-30) } else { UNKNOWN_NOISE }
+    }
+
     /// Why a pixel keeps its samples, or 0: what moves of them is in `c`.
-    fn reason_to_keep(&self, left: &Left, pixel: usize, c: &mut Carried) -> u32 {
+    fn reason_to_keep(&self, left: &Left, pixel: usize, c: &mut Carried, noise: &mut f32) -> u32 {
         let at = left.points[pixel];
         if at.triangle == NONE {
             return DROPPED_SKY;
@@ -182,6 +199,7 @@ impl Reprojection<'_> {
             return DROPPED_SPECULAR;
         }
         c.edge = !self.is_whole(left.guide, pixel, s.geometric, pixel_width(&self.previous, self.push.size));
+        *noise = self.noise_around(left, pixel, s.geometric, c.edge);
         let worth = self.kept_by_spread(left, pixel, s.geometric, c.count, c.edge);
         c.count = match c.edge {
             true => self.kept_of_edge(left, pixel, s.geometric, c.count).min(worth),
@@ -208,17 +226,19 @@ impl Reprojection<'_> {
             let still = self.still();
             let before = Some(Carried::of(left.carried[pixel])).filter(|c| c.count > 0).unwrap_or_default();
             let mut now = self.older(before, s.count);
+            let mut noise = UNKNOWN_NOISE;
             let reason = match (still || s.count == 0, now.count) {
                 (true, _) => 0,
                 (false, 0) => DROPPED_OLD,
-                (false, _) => self.reason_to_keep(left, pixel, &mut now),
+                (false, _) => self.reason_to_keep(left, pixel, &mut now, &mut noise),
             };
             handed.offered.push(if reason == 0 { now.word() } else { dropped(reason) });
             let share = if still { freedom(now.count) / freedom(s.count) } else { 1.0 };
             let of_one = |m2: f32| m2 * share / if still { 1.0 } else { freedom(s.count) };
             let variance = s.m2.map(of_one);
             let SurfacePoint { triangle, instance, weights, .. } = self.numbered_anew(at);
-            handed.records.push(History { triangle, instance, weights, mean: s.mean, variance, ..Default::default() });
+            let mean = s.mean;
+            handed.records.push(History { triangle, instance, weights, mean, variance, noise, ..Default::default() });
             let (direct, albedo, indirect_variance) = (l.direct, l.albedo, of_one(l.indirect_m2));
             handed.light.push(HistoryLight { direct, albedo, indirect_variance, ..Default::default() });
         }
@@ -228,13 +248,12 @@ impl Reprojection<'_> {
     fn older(&self, c: Carried, count: u32) -> Carried {
         let (limit, still) = (self.push.max_age, self.still());
         let age = (c.age * c.count + count / 2) / count.max(1);
-        let error = (c.error * c.count).div_ceil(count.max(1));
         let most = count.min(if still { MOST_CARRIED } else { self.push.max_samples });
         let (count, age) = match !still && age >= limit {
             true => (most * limit / (age + 1), limit.max(1) - 1),
             false => (most, age),
         };
-        Carried { count, age, error, edge: false, back: false }
+        Carried { count, age, edge: false, back: false }
     }
 
     pub(super) fn shows(&self, seen: &Guide, s: &Surface) -> bool {
@@ -243,27 +262,25 @@ impl Reprojection<'_> {
         near && seen.object == s.object && seen.material == s.material
     }
 
-    fn view_error(&self, s: &Surface, irradiance_of: Vec3, before: Vec3, after: Vec3) -> f32 {
+    /// Square of the share by which the changed view may move a surface's light.
+    pub(super) fn view_change(&self, s: &Surface) -> f32 {
         let bsdf = surface_bsdf(self.scene, s);
         if !bsdf_is_specular(&bsdf) {
             return 0.0;
         }
-        let side = if s.normal.dot(before) < 0.0 { -1.0 } else { 1.0 };
-        let albedo = bsdf_albedo(&bsdf, s.normal.dot(before).abs()).max(Vec3::splat(LEAST_ALBEDO));
-        let irradiance = PI * irradiance_of / albedo;
+        let [before, after] = [self.previous, self.camera].map(|c| (Vec3::from(c.position) - s.position).normalize());
+        let n = if s.normal.dot(before) < 0.0 { -s.normal } else { s.normal };
         let of = |view: Vec3| {
-            let n = side * s.normal;
             let from = 2.0 * view.dot(n) * n - view;
-            ((scattered(s, &bsdf, after, from) - scattered(s, &bsdf, before, from)).abs() * irradiance).max_element()
+            let [a, b] = [before, after].map(|wo| scattered(s, &bsdf, wo, from));
+            ((b - a).abs() / a.max(b).max(Vec3::splat(1e-30))).max_element()
         };
         of(before).max(of(after))
     }
 
-    /// By how much the changed view moves a surface's light, whose samples were around `pixel`, in shares of what is allowed.
-    pub(super) fn view_change(&self, records: &[History], s: &Surface, pixel: usize) -> f32 {
-        let views = [self.previous, self.camera].map(|c| (Vec3::from(c.position) - s.position).normalize());
-        self.view_error(s, light_around(records, pixel, self.push.size), views[0], views[1])
-            / self.push.max_error.max(1e-30)
+    /// How many of `count` samples of an old pixel that change leaves.
+    pub(super) fn worth_in_view(&self, count: u32, change: f32, h: &History) -> u32 {
+        worth(count, change / (self.push.view * self.push.view * h.noise).max(1e-30))
     }
 
     /// How many of a pixel's samples the changed light leaves.
@@ -310,16 +327,14 @@ impl Reprojection<'_> {
         if c.count == 0 {
             return dropped(DROPPED_LIGHT);
         }
-        let view = self.view_change(&handed.records, &s, pixel);
-        let parts = (view * ERROR_PARTS as f32).ceil();
-        // A number that is none fails both comparisons.
-        if !(view <= 1.0 && c.error as f32 + parts <= ERROR_PARTS as f32) {
+        c.count = self.worth_in_view(c.count, self.view_change(&s), h);
+        if c.count == 0 {
             return dropped(DROPPED_VIEW);
         }
         let film = film_from_point(&self.camera, s.position, self.push.size);
         let ahead = film.z > 0.0 && film.is_finite();
         let reason = if ahead { self.offer(guide, winner, pixel, c, &s, film.truncate()) } else { DROPPED_OUTSIDE };
-        let word = Carried { age: c.age + 1, error: c.error + parts as u32, ..c }.word();
+        let word = Carried { age: c.age + 1, ..c }.word();
         if reason == 0 { word } else { dropped(reason) }
     }
 

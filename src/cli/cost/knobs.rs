@@ -59,8 +59,7 @@ const KNOBS: &[Knob] = &[
     knob("sigma-l", &["2", "4", "8"], Filters),
     knob("basis", &["cdf22", "red-black"], Filters),
     knob("oidn-quality", &["fast", "balanced", "high"], Filters),
-    // 1, 4 and 8 of 256: Schalk 2018.
-    knob("reproject-error", &["0", "0.00390625", "0.015625", "0.03125"], Carried),
+    knob("reproject-error", &["0", "0.1", "0.25", "0.5"], Carried),
     knob("reproject-light", &["0.02", "0.05", "0.1", "0.2"], Carried),
     // Of eight frames: what a longer history is worth they do not tell.
     knob("reproject-samples", &["2", "4", "8", "256"], Carried),

@@ -29,8 +29,8 @@ use std::time::{Duration, Instant};
 ///
 /// With --reproject forward a frame begins with samples of the one before, and so depends on all before it. The first frame that is
 /// asked for, and one after a frame that failed, begins anew: --only 40..48 is the same sequence begun at frame 40. A run that goes
-/// on takes up the .exr file of the last finished frame, to the same bits: its layers carried.samples, carried.age and carried.error
-/// say how many samples of a pixel are of earlier frames, through how many they came on average, and what error they are accounted.
+/// on takes up the .exr file of the last finished frame, to the same bits: its layers carried.samples and carried.age say how many
+/// samples of a pixel are of earlier frames, and through how many they came on average.
 #[derive(clap::Args)]
 #[command(
     mut_args(with_ranges(Reproject::default().entries())),

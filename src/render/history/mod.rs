@@ -42,8 +42,9 @@ settings! {
             /// Whether frames begin with the samples of the last that still hold; `tallow sequence` moves them forward where something
             /// moves, the camera has no lens, and samples are placed by no threshold or limit
             reproject: Reprojection = Reprojection::Forward, .., [value_name = "HOW"];
-            /// Largest error by changed view that carried samples may have, in units of radiance.
-            reproject_error: f32 = 1.0 / 256.0, FROM_0;
+            /// Change of light by a new view before carried samples count less, as a share of the noise of one sample, its standard
+            /// deviation; 0 carries none whose look changes.
+            reproject_error: f32 = 0.25, FROM_0;
             /// Share by which light may change from frame to frame before carried samples count less: the deviation of one sample
             /// that a filter leaves, about.
             reproject_light: f32 = 0.05, FROM_0;
@@ -220,7 +221,7 @@ impl History {
             size: constants.size,
             first_pixel,
             pixels,
-            max_error: s.reproject_error,
+            view: s.reproject_error,
             noise: s.reproject_light,
             aliasing: s.reproject_aliasing,
             max_samples: s.reproject_samples,

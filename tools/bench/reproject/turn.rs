@@ -33,8 +33,8 @@ pub struct Args {
     /// Frames after the last step
     #[arg(long, default_value_t = 6)]
     rest: u32,
-    /// Limits of the error, in 256ths
-    #[arg(long, value_delimiter = ',', default_values_t = [1.0, 4.0, 8.0])]
+    /// Values of reproject-error
+    #[arg(long, value_delimiter = ',', default_values_t = [0.25])]
     errors: Vec<f32>,
     /// Measure also with four samples of a pixel that are carried each on its own
     #[arg(long)]
@@ -80,10 +80,10 @@ fn arms(args: &Args) -> Vec<(String, Arm)> {
     let mut carries = Reproject::default();
     args.carry.apply(&mut carries);
     for &error in &args.errors {
-        let carries = Some(Reproject { reproject_error: error / 256.0, ..carries });
+        let carries = Some(Reproject { reproject_error: error, ..carries });
         for &quarters in if args.quarters { &[false, true][..] } else { &[false] } {
             let each = if quarters { ", four each" } else { "" };
-            let of = |name, policy| (format!("{name}, E = {error}/256{each}"), arm(policy, carries, quarters));
+            let of = |name, policy| (format!("{name}, E = {error}{each}"), arm(policy, carries, quarters));
             arms.extend([of("reprojection", "uniform"), of("both", "variance")]);
         }
     }
