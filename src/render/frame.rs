@@ -6,7 +6,6 @@ use crate::layout::{FrameConstants, NONE, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::history::History;
 use crate::render::kernels::{Allocation, Kernels};
-use crate::render::moving::check_camera;
 use crate::render::pass::sample_list::Bind;
 use crate::render::pass::{accumulate, choose, light_change, path, primary_hit, reproject, sample_list};
 use crate::render::schedule::Step;
@@ -115,7 +114,7 @@ fn begin_anew(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     rec.fill(&film.broken, 0)?; // 0 -> broken
     if let Some(history) = &frame.history {
         rec.fill(&history.carried, 0)?; // 0 -> carried[P]
-        history.settle(check_camera(&constants.camera).is_ok());
+        history.settle(Some(constants.camera));
     }
     for tile in &film.tiles {
         rec.fill(&tile.stats, 0)?; // 0 -> stats[P]
@@ -127,11 +126,12 @@ fn begin_anew(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     Ok(())
 }
 
-/// Begins a frame with the samples of the last that still hold; without any where either was seen otherwise than from a point.
+/// Begins a frame with the samples of the last that still hold; without any where something has changed and either was seen otherwise than
+/// from a point.
 fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     let Frame { scene, film, constants, kernels, .. } = frame;
     let (history, tile) = (frame.history()?, &film.tiles[0]);
-    if !history.is_of_points() || check_camera(&constants.camera).is_err() {
+    if !history.leads_to(&constants.camera) {
         rec.fill(&history.offered, 0)?; // 0 -> offered[P]
         return begin_anew(rec, frame);
     }
@@ -148,7 +148,7 @@ fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     }
     primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P], points[P]
     reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
-    history.settle(true);
+    history.settle(Some(constants.camera));
     Ok(())
 }
 

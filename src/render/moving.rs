@@ -5,7 +5,7 @@ use super::schedule::{self, Begun};
 use super::{Renderer, Step, kernels};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, PassTime};
-use crate::layout::{Camera, NONE, PixelStats, SurfacePoint};
+use crate::layout::{NONE, PixelStats, SurfacePoint};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 
@@ -13,7 +13,7 @@ impl Renderer {
     /// From now on frames can begin with [`Step::Reproject`] in place of [`Step::Start`]: with the samples of the last frame that
     /// show the same surface from the new camera. Call it once, before anything is recorded; the renderer must have been made with
     /// [`super::Outputs::guides`]. The first [`Step::Reproject`] of all carries nothing, nor does one of a camera with a lens or parallel
-    /// rays, or after such a one. `moves` says what may change between frames.
+    /// rays, or after such a one, unless nothing has changed. `moves` says what may change between frames.
     ///
     /// Carried samples count in the mean, in its variance and in the number of samples of a pixel. They are no part of the
     /// sequence that new samples come from: give each frame its own by [`Self::set_first_sample`], or its own seed.
@@ -110,22 +110,9 @@ impl Renderer {
 /// # Errors
 /// [`Error::Usage`] with what speaks against it: a lens, parallel rays, too many pixels, or settings under which no budget is placed.
 pub fn can_carry(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<()> {
-    check_camera(&scene.camera([settings.width, settings.height])?)?;
+    History::check_camera(&scene.camera([settings.width, settings.height])?)?;
     History::check_room(gpu, settings.pixels() as u32)?;
     check_placing(settings)
-}
-
-/// # Errors
-/// [`Error::Usage`] for a camera with a lens or parallel rays.
-pub(super) fn check_camera(camera: &Camera) -> Result<()> {
-    let what = match camera {
-        Camera { orthographic: 1.., .. } => "nothing can be carried between views of an orthographic camera",
-        Camera { lens_radius, .. } if *lens_radius > 0.0 => {
-            "samples through a lens show many points: nothing can be carried; render with lens_radius 0"
-        }
-        _ => return Ok(()),
-    };
-    Err(Error::Usage(what.into()))
 }
 
 fn check_stride(settings: &Settings) -> Result<()> {

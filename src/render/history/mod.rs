@@ -18,6 +18,7 @@ use numbers::Numbers;
 pub use probes::Probes;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
 pub(super) use way::{Forward, Way};
 
 choices! {
@@ -103,8 +104,8 @@ pub struct History {
     no_change: Buffer<LightChange>,
     /// Whether more than the camera has changed since the last frame.
     changed: AtomicBool,
-    /// Whether every pixel of the last frame was seen from one point: samples through a lens show many.
-    of_points: AtomicBool,
+    /// The camera of the last frame, none where nothing of it may be carried.
+    last: Mutex<Option<Camera>>,
     settings: Reproject,
     spp: u32,
 }
@@ -114,6 +115,19 @@ impl History {
     pub fn bytes_per_pixel(split_light: bool) -> usize {
         let light = if split_light { size_of::<HistoryLight>() } else { 0 };
         size_of::<Record>() + 2 * size_of::<u32>() + size_of::<SurfacePoint>() + light
+    }
+
+    /// # Errors
+    /// [`Error::Usage`] for a camera with a lens or parallel rays.
+    pub(super) fn check_camera(camera: &Camera) -> Result<()> {
+        let what = match camera {
+            Camera { orthographic: 1.., .. } => "nothing can be carried between views of an orthographic camera",
+            Camera { lens_radius, .. } if *lens_radius > 0.0 => {
+                "samples through a lens show many points: nothing can be carried; render with lens_radius 0"
+            }
+            _ => return Ok(()),
+        };
+        Err(Error::Usage(what.into()))
     }
 
     /// # Errors
@@ -163,7 +177,7 @@ impl History {
             probes,
             no_change: Buffer::from_slice(gpu, "no changes of light", &[])?,
             changed: AtomicBool::new(false),
-            of_points: AtomicBool::new(false),
+            last: Mutex::new(None),
             settings,
             spp,
         })
@@ -190,20 +204,30 @@ impl History {
         self.changed.load(Relaxed)
     }
 
-    /// Whether every pixel of the last frame was seen from one point.
+    /// Whether every pixel of the last frame was seen from one point: samples through a lens show many.
     pub(super) fn is_of_points(&self) -> bool {
-        self.of_points.load(Relaxed)
+        self.last().is_some_and(|camera| Self::check_camera(&camera).is_ok())
+    }
+
+    /// Whether a frame from `camera` can begin with samples of the last: where nothing has changed, with all of any camera.
+    pub(super) fn leads_to(&self, camera: &Camera) -> bool {
+        let still = !self.has_changed() && self.last() == Some(*camera);
+        still || self.is_of_points() && Self::check_camera(camera).is_ok()
+    }
+
+    fn last(&self) -> Option<Camera> {
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Notes that nothing of the last frame may be carried, nor its scene be looked at.
     pub(super) fn forget(&self) {
-        self.settle(false);
+        self.settle(None);
     }
 
-    /// Notes that a frame has begun with what there is now, seen from one point or not.
-    pub(super) fn settle(&self, of_points: bool) {
+    /// Notes that a frame has begun with what there is now, seen by this camera.
+    pub(super) fn settle(&self, camera: Option<Camera>) {
         self.changed.store(false, Relaxed);
-        self.of_points.store(of_points, Relaxed);
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = camera;
     }
 
     /// How light had changed in each cell of 4x4 pixels of the last frame at the last [`Step::Reproject`](super::Step::Reproject) that followed a
