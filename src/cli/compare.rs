@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let load = |path| load(path, args.layer.as_deref(), "name a layer with --layer");
     let (a, b) = (load(&args.a)?, load(&args.b)?);
-    check_sizes((&args.a, &a), (&args.b, &b))?;
+    check_sizes((&args.a, a.size()), (&args.b, b.size()))?;
     image::check_memory(&args.a, a.pixels.len() as u64 * BYTES_PER_PIXEL)?;
     let metrics = metrics::compare(&a, &b);
     let exceeded = args.limits.exceeded(&metrics)?;
@@ -111,15 +111,15 @@ pub fn load(path: &Path, layer: Option<&str>, remedy: &str) -> Result<Picture> {
     picture.finite().map_err(|what| Error::input(path, what))
 }
 
-/// Checks that two pictures have the same size.
+/// Checks that the pictures of two files have the same size.
 ///
 /// # Errors
 /// [`Error::Input`] about the first file.
-pub fn check_sizes((a_path, a): (&Path, &Picture), (b_path, b): (&Path, &Picture)) -> Result<()> {
-    if (a.width, a.height) == (b.width, b.height) {
+pub fn check_sizes((a_path, a): (&Path, [u32; 2]), (b_path, b): (&Path, [u32; 2])) -> Result<()> {
+    if a == b {
         return Ok(());
     }
-    let size = |p: &Picture| format!("{}x{}", p.width, p.height);
+    let size = |[width, height]: [u32; 2]| format!("{width}x{height}");
     let what = format!("is {}, but {} is {}: compare images of one size", size(a), b_path.display(), size(b));
     Err(Error::input(a_path, what))
 }

@@ -14,7 +14,7 @@ use crate::gpu::{Gpu, PassTime, Tracing};
 use crate::image::aov::{Aovs, is_noisy};
 use crate::image::metrics::{self, Metrics};
 use crate::image::source::{Source, Unread};
-use crate::image::{self, Claim, NOISY, Picture};
+use crate::image::{self, Claim, Film, NOISY, Picture};
 use crate::layout::vec3;
 use crate::memory;
 use crate::report::table::{self, PassRow};
@@ -122,10 +122,11 @@ pub fn run(args: &Args) -> Result<Exit> {
     let start = Instant::now();
     let (colour, times, notes) = filtered(args, &gpu, &aovs)?;
     let seconds = start.elapsed().as_secs_f64();
-    let clean = replaced(args, &source, &aovs, colour)?;
+    let clean = Clean::new(args, &source, &aovs, colour)?;
     fail_on_messages(&gpu)?;
     let (written, files) = write(args, &clean);
-    let distance = |image: &Source, layer| reference.as_ref().map_or(Ok(None), |r| distance(args, image, layer, r));
+    let noisy = reference.as_ref().map(|_| source.shown(noisy_layer(args, &source), &[])).transpose()?;
+    let distance = |picture: &Option<Picture>| distance(picture.as_ref()?, reference.as_ref()?);
     let summary = Summary {
         files: written,
         filter: args.filter.name(),
@@ -135,8 +136,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         seconds,
         device: gpu.info().name.clone(),
         passes: table::summarise(&times),
-        before: distance(&source, noisy_layer(args, &source))?,
-        after: distance(&clean, result_layer(args))?,
+        before: distance(&noisy),
+        after: distance(&clean.shown),
     };
     args.common.report(&summary, || text(args, &summary))?;
     files.failure().map_or(Ok(()), Err)?;
@@ -151,8 +152,8 @@ fn aovs<'a>(args: &Args, source: &'a Source) -> Result<Aovs<'a>> {
 
 /// Bytes of host memory that filtering takes besides the file itself: the file's channels and the filtered colour, and then
 /// whichever is larger of two. While the image is filtered, these are the device's planes, if the device has no memory of its
-/// own. While the colour is put into the file, these are three copies of the file with the colour added: encoded, decoded, and
-/// decoded again to be shown.
+/// own. While the colour is put into the file, these are three copies of the file with the colour added: encoded as EXR if it is
+/// none, decoded, and encoded again.
 fn bytes_needed(args: &Args, claim: &Claim, unified: bool) -> u64 {
     let colour = claim.pixels().saturating_mul(size_of::<vec3>() as u64);
     let planes = if unified { claim.pixels().saturating_mul(denoise::bytes_per_pixel(args.filter)) } else { 0 };
@@ -192,11 +193,42 @@ fn check_filter(args: &Args) -> Result<()> {
     args.filter.check()
 }
 
-fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
-    let options = args.png.write_options();
-    let item = |path: &'a PathBuf| Item {
-        path: path.clone(),
-        fill: Box::new(move |stream| clean.encode(path, result_layer(args), &options, stream)),
+/// What is left to write: only what the outputs and the reference call for.
+struct Clean {
+    /// The file with the filtered colour.
+    exr: Option<Vec<u8>>,
+    /// The filtered colour, where it is shown.
+    shown: Option<Picture>,
+}
+
+impl Clean {
+    /// Puts the filtered colour into the file and keeps the noisy one as a layer. A single grey channel gets the mean of the
+    /// three.
+    fn new(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Result<Self> {
+        if aovs.colour[0] == aovs.colour[1] {
+            let [r, g, b] = &colour;
+            let grey: Vec<f32> = r.iter().zip(g).zip(b).map(|((r, g), b)| (r + g + b) / 3.0).collect();
+            colour = [0; 3].map(|_| grey.clone());
+        }
+        let channels: Vec<_> = aovs.colour.into_iter().zip(colour.iter().map(Vec::as_slice)).collect();
+        let has_layers = |path: &PathBuf| image::has_layers(path);
+        let whole = args.outputs.iter().any(has_layers);
+        let shown = args.reference.is_some() || !args.outputs.iter().all(has_layers);
+        let encoded = || source.encoded(&channels, aovs.keep_as(), (image::FILTERED, args.filter.name()));
+        Ok(Self {
+            exr: whole.then(encoded).transpose()?,
+            shown: shown.then(|| source.shown(result_layer(args), &channels)).transpose()?,
+        })
+    }
+}
+
+fn write<'a>(args: &'a Args, clean: &'a Clean) -> (Vec<String>, Files) {
+    let film = clean.shown.as_ref().map(Film::from).unwrap_or_default();
+    let item = |path: &'a PathBuf| match &clean.exr {
+        Some(exr) if image::has_layers(path) => {
+            Item { path: path.clone(), fill: Box::new(move |stream| stream.write_all(exr)) }
+        }
+        _ => Item::image(path.clone(), &film, args.png.write_options()),
     };
     let items: Vec<_> = args.outputs.iter().map(item).collect();
     let mut files = Files::default();
@@ -238,23 +270,11 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime
     Ok((clean.colour, clean.times, notes))
 }
 
-/// Puts the filtered colour into the file and keeps the noisy one as a layer. A single grey channel gets the mean of the
-/// three.
-fn replaced(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Result<Source> {
-    if aovs.colour[0] == aovs.colour[1] {
-        let [r, g, b] = &colour;
-        let grey: Vec<f32> = r.iter().zip(g).zip(b).map(|((r, g), b)| (r + g + b) / 3.0).collect();
-        colour = [0; 3].map(|_| grey.clone());
-    }
-    let channels: Vec<_> = aovs.colour.into_iter().zip(colour.iter().map(Vec::as_slice)).collect();
-    source.replaced(&channels, aovs.keep_as(), (image::FILTERED, args.filter.name()))
-}
-
 /// Reads the reference, before any long work, and checks that it has the size of the image.
 fn reference(args: &Args, source: &Source) -> Result<Option<Picture>> {
     let Some(path) = &args.reference else { return Ok(None) };
     let reference = compare::load(path, None, "save its colour as R, G, B")?;
-    check_sizes((&args.image, &shown(args, source, result_layer(args))?), (path, &reference))?;
+    check_sizes((&args.image, source.shown_size()?), (path, reference.size()))?;
     Ok(Some(reference))
 }
 
@@ -268,13 +288,9 @@ fn result_layer(args: &Args) -> Option<&str> {
     args.layers.colour.as_deref().filter(|name| !is_noisy(name))
 }
 
-fn shown(args: &Args, image: &Source, layer: Option<&str>) -> Result<Picture> {
-    image.shown()?.rec709(layer).map_err(|what| Error::input(&args.image, what))
-}
-
-fn distance(args: &Args, image: &Source, layer: Option<&str>, reference: &Picture) -> Result<Option<Metrics>> {
-    let picture = shown(args, image, layer)?;
-    Ok((picture.non_finite() == 0).then(|| metrics::compare(&picture, reference)))
+/// `None` for a picture that is not finite.
+fn distance(picture: &Picture, reference: &Picture) -> Option<Metrics> {
+    (picture.non_finite() == 0).then(|| metrics::compare(picture, reference))
 }
 
 fn text(args: &Args, s: &Summary) -> String {

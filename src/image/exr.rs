@@ -1,7 +1,7 @@
 //! OpenEXR files. Those of any program are read; those written have scan lines with lossless compression.
 use super::claim::{self, Claim};
 use super::film::{Channel, Film, Samples, split};
-use super::frame::{Frame, held, shown, union};
+use super::frame::{self, Frame, held, shown, union};
 use super::output::Stream;
 use super::primaries::{from_exr, to_exr};
 use super::sorted_head::SortedHead;
@@ -96,6 +96,12 @@ pub(super) fn claim(bytes: &[u8], frame: Frame) -> Result<Claim, String> {
     MetaData::validate(&meta.headers, false).map_err(plain)?;
     check_sampling(&meta)?;
     claim::of_exr(&meta, bytes.len().saturating_sub(stream.position() as usize), frame)
+}
+
+/// The rectangles of [`Frame::Data`] and [`Frame::Display`], from the headers alone.
+pub(super) fn frames(bytes: &[u8]) -> Result<[IntegerBounds; 2], String> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(plain)?;
+    Ok([Frame::Data, Frame::Display].map(|frame| frame::of(&meta, frame)))
 }
 
 /// Decodes a file. It must be called only after [`claim`] has accepted the headers.

@@ -72,6 +72,11 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// The picture of a plane per component, each of `width * height` values.
     pub fn of_planes([width, height]: [u32; 2], [r, g, b]: &[Vec<f32>; 3]) -> Self {
         let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
@@ -201,7 +206,7 @@ impl Film {
         }
     }
 
-    fn no_such_layer(&self, layer: Option<&str>) -> String {
+    pub(super) fn no_such_layer(&self, layer: Option<&str>) -> String {
         let wanted = layer.map_or("no colour (R, G, B)".to_owned(), |name| format!("no single layer {name:?}"));
         let names: Vec<_> = self.channels.iter().map(|c| c.name.as_str()).collect();
         format!("holds {wanted}; its channels are {}", names.join(", "))

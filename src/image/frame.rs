@@ -53,6 +53,13 @@ pub(super) fn held(data: IntegerBounds, frame: IntegerBounds) -> Option<Window> 
     (!all).then_some(Window { first: [x, y], size: [width, height] })
 }
 
+/// The rectangle of a part of `frame`, as [`held`] tells it.
+pub(super) fn part(window: Window, frame: IntegerBounds) -> IntegerBounds {
+    let [x, y] = window.first.map(|first| first as i32);
+    let size = window.size.map(|edge| edge as usize);
+    IntegerBounds::new((frame.position.0 + x, frame.position.1 + y), (size[0], size[1]))
+}
+
 /// Copies samples from the rectangle `data` into the rectangle `window`. Pixels outside `data` are 0, and samples outside
 /// `window` are dropped.
 pub(super) fn shown<T: Copy + Default>(

@@ -1,10 +1,10 @@
 //! An image file in memory of which some channels are replaced and all others are kept.
-use super::film::Film;
-use super::frame::Frame;
-use super::output::Stream;
-use super::{Claim, WriteOptions, exr, output};
+use super::film::{Channel, Film, Picture};
+use super::frame::{self, Frame};
+use super::{Claim, exr, primaries};
 use crate::error::{Error, Result};
-use std::io::{Cursor, ErrorKind};
+use ::exr::meta::attribute::IntegerBounds;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// An image file in memory of which only the header was decoded.
@@ -31,13 +31,8 @@ impl Unread {
     /// # Errors
     /// As [`super::read`].
     pub fn decode(self) -> Result<Source> {
-        let Self { path, mut bytes, .. } = self;
+        let Self { path, bytes, .. } = self;
         let film = super::decode_file(&path, &bytes, Frame::Data)?;
-        if !super::is_exr(&bytes) {
-            let mut encoded = Cursor::new(Vec::new());
-            exr::encode(&film, &mut encoded).map_err(|e| Error::input(&path, e))?;
-            bytes = encoded.into_inner();
-        }
         Ok(Source { path, bytes, film })
     }
 }
@@ -45,11 +40,13 @@ impl Unread {
 /// An image file in memory.
 pub struct Source {
     path: PathBuf,
-    /// The content as EXR, whatever the format of the file.
     bytes: Vec<u8>,
     /// Every stored pixel, shown or not, with row 0 at the top.
     pub film: Film,
 }
+
+/// New samples of channels, which are named as in [`Source::film`]: one sample for each of its pixels.
+pub type Replaced<'a> = [(&'a str, &'a [f32])];
 
 impl Source {
     /// Reads an EXR, PNG, JPEG or HDR file.
@@ -60,53 +57,78 @@ impl Source {
         Unread::open(path)?.decode()
     }
 
-    /// Decodes the part that is shown, the display window.
+    /// Width and height of the part that is shown, the display window.
     ///
     /// # Errors
-    /// [`Error::Input`] when the data are damaged, [`Error::Memory`] when there is not enough memory.
-    pub fn shown(&self) -> Result<Film> {
-        super::decode_file(&self.path, &self.bytes, Frame::Display)
+    /// [`Error::Input`] when it is far larger than what is stored.
+    pub fn shown_size(&self) -> Result<[u32; 2]> {
+        Ok(self.shown_claim()?.size)
     }
 
-    /// Replaces the samples of the named channels, one per pixel of `film`, and adds an entry of metadata. The old samples are
-    /// kept in the layer `keep_as`, if one is named.
+    /// The colour that is shown, or another layer, as Rec. 709: what [`super::read`] and [`Film::rec709`] make of the file that
+    /// [`Source::encoded`] returns.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when there is no such layer, [`Error::Memory`].
+    pub fn shown(&self, layer: Option<&str>, replaced: &Replaced) -> Result<Picture> {
+        let claim = self.shown_claim()?;
+        super::check_memory(&self.path, claim.bytes)?;
+        let input = |what| Error::input(&self.path, what);
+        let channels = self.film.find(layer).ok_or_else(|| input(self.film.no_such_layer(layer)))?;
+        let frames = self.frames().map_err(input)?;
+        let [r, g, b] = channels.map(|channel| shown_samples(channel, replaced, frames).map_err(input));
+        let mut picture = Picture::of_planes(claim.size, &[r?, g?, b?]);
+        self.film.primaries.iter().for_each(|own| primaries::to_rec709(own, &mut picture.pixels));
+        Ok(picture)
+    }
+
+    /// Encodes an EXR file of everything, with new samples and another entry of metadata. The old samples are kept in the layer
+    /// `keep_as`, if one is named.
     ///
     /// # Errors
     /// [`Error::Input`] when the file holds something that cannot be written again.
-    pub fn replaced(&self, channels: &[(&str, &[f32])], keep_as: Option<&str>, entry: (&str, &str)) -> Result<Self> {
+    pub fn encoded(&self, channels: &Replaced, keep_as: Option<&str>, entry: (&str, &str)) -> Result<Vec<u8>> {
         let with = exr::Replacement { channels, keep_as, entry };
-        let bytes = super::contained(|| exr::replace(&self.bytes, &with));
-        let bytes = bytes.map_err(|what| Error::input(&self.path, what))?;
-        let film = super::decode_file(&self.path, &bytes, Frame::Data)?;
-        Ok(Self { path: self.path.clone(), bytes, film })
+        let bytes = match super::is_exr(&self.bytes) {
+            true => super::contained(|| exr::replace(&self.bytes, &with)),
+            false => self.as_exr().and_then(|bytes| exr::replace(&bytes, &with)),
+        };
+        bytes.map_err(|what| Error::input(&self.path, what))
     }
 
-    /// Writes everything to an `.exr` file, and only the colour that is shown to other formats.
-    ///
-    /// # Errors
-    /// As [`super::write`].
-    pub fn write(&self, path: &Path, options: &WriteOptions) -> Result<()> {
-        super::format_of(path)?;
-        output::write_with(path, |stream| self.encode(path, None, options, stream))
+    fn as_exr(&self) -> std::result::Result<Vec<u8>, String> {
+        let mut encoded = Cursor::new(Vec::new());
+        exr::encode(&self.film, &mut encoded).map_err(|e| e.to_string())?;
+        Ok(encoded.into_inner())
     }
 
-    /// Writes to `stream` what [`Source::write`] would write to a file of this name, or instead of the colour another layer.
-    ///
-    /// # Errors
-    /// As [`super::encode`].
-    pub fn encode(
-        &self,
-        path: &Path,
-        layer: Option<&str>,
-        options: &WriteOptions,
-        stream: &mut dyn Stream,
-    ) -> std::io::Result<()> {
-        if super::has_layers(path) {
-            return stream.write_all(&self.bytes);
+    fn shown_claim(&self) -> Result<Claim> {
+        super::claim_of(&self.bytes, Frame::Display).map_err(|what| Error::input(&self.path, what))
+    }
+
+    /// The rectangles that are stored and shown.
+    fn frames(&self) -> std::result::Result<[IntegerBounds; 2], String> {
+        let Film { width, height, .. } = self.film;
+        match super::is_exr(&self.bytes) {
+            true => exr::frames(&self.bytes),
+            false => Ok([IntegerBounds::new((0, 0), (width as usize, height as usize)); 2]),
         }
-        let invalid = |what: String| std::io::Error::new(ErrorKind::InvalidData, what);
-        let shown = self.shown().map_err(|e| invalid(e.to_string()))?;
-        let colour = shown.rec709(layer).map_err(invalid)?;
-        super::encode(path, &Film::from(&colour), options, stream)
+    }
+}
+
+/// The samples of a channel, or the new ones, in the rectangle that is shown; 0 where the file stores none.
+fn shown_samples(
+    channel: &Channel,
+    replaced: &Replaced,
+    [stored, shown]: [IntegerBounds; 2],
+) -> std::result::Result<Vec<f32>, String> {
+    let fresh = replaced.iter().find(|(name, _)| *name == channel.name);
+    let samples = fresh.map_or_else(|| channel.samples.to_f32(), |(_, samples)| (*samples).into());
+    match channel.window {
+        None => frame::shown(&samples, stored, shown),
+        Some(window) => {
+            let held = frame::part(window, stored);
+            frame::shown(&frame::shown(&samples, stored, held)?, held, shown)
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use tallow::error::Error;
 use tallow::image::aov::{Aov, Aovs, Names};
 use tallow::image::source::Source;
-use tallow::image::{self, Film, Samples, Window, WriteOptions};
+use tallow::image::{self, Film, Picture, Samples, Window, WriteOptions};
 use tempfile::TempDir;
 
 type Part = Layer<AnyChannels<FlatSamples>>;
@@ -35,8 +35,13 @@ fn rewritten(source: &Source, folder: &TempDir) -> (Film, PathBuf) {
         (0..3).map(|c| (0..source.film.pixels()).map(|i| colour.at(i)[c] + 0.25).collect()).collect();
     let channels: Vec<_> = aovs.colour.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
     let path = folder.path().join("clean.exr");
-    source.replaced(&channels, None, ("filtered", "none")).unwrap().write(&path, &WriteOptions::default()).unwrap();
+    std::fs::write(&path, source.encoded(&channels, None, ("filtered", "none")).unwrap()).unwrap();
+    assert_eq!(source.shown(None, &channels).unwrap(), shown(&path), "what is shown needs no file");
     (Source::read(&path).unwrap().film, path)
+}
+
+fn shown(path: &Path) -> Picture {
+    image::read(path).unwrap().rec709(None).unwrap()
 }
 
 fn values(film: &Film, name: &str) -> Vec<f32> {
@@ -68,14 +73,17 @@ fn what_was_there_stays_in_a_layer_of_the_same_part() {
     let aovs = Aovs::find(&source.film, &Names::new()).unwrap();
     assert_eq!(aovs.keep_as(), Some("Noisy Image"));
     let channels: Vec<_> = aovs.colour.into_iter().map(|name| (name, &[7.0; 12][..])).collect();
-    let clean = source.replaced(&channels, aovs.keep_as(), ("filtered", "none")).unwrap();
+    let path = folder.path().join("clean.exr");
+    std::fs::write(&path, source.encoded(&channels, aovs.keep_as(), ("filtered", "none")).unwrap()).unwrap();
+    let clean = Source::read(&path).unwrap();
+    assert_eq!(source.shown(None, &channels).unwrap(), shown(&path));
     assert_eq!(values(&clean.film, "View.Combined.G"), [7.0; 12]);
     let again = Aovs::find(&clean.film, &Names::new()).unwrap();
     let noisy = |aovs: &Aovs, i: usize| aovs.get(Aov::Colour).unwrap().at(i);
     assert!((0..12).all(|i| noisy(&again, i) == noisy(&aovs, i)), "it is what is filtered next");
     assert_eq!((again.colour, again.keep_as()), (aovs.colour, None));
-    let twice = clean.replaced(&channels, None, ("filtered", "atrous")).unwrap();
-    assert_eq!(twice.film.metadata["filtered"], "atrous");
+    std::fs::write(&path, clean.encoded(&channels, None, ("filtered", "atrous")).unwrap()).unwrap();
+    assert_eq!(Source::read(&path).unwrap().film.metadata["filtered"], "atrous");
 }
 
 #[test]

@@ -58,9 +58,9 @@ pub struct Args {
 pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
     check_outputs(a, b, args)?;
     let sides = [Side::read(a, None)?, Side::read(b, args.errors.as_deref())?];
-    let [a_colour, b_colour] = sides.each_ref().map(Side::picture);
-    check_sizes((a, &a_colour), (b, &b_colour))?;
-    image::check_memory(a, a_colour.pixels.len() as u64 * BYTES_PER_PIXEL)?;
+    let [a_size, b_size] = sides.each_ref().map(|side| [side.film.width, side.film.height]);
+    check_sizes((a, a_size), (b, b_size))?;
+    image::check_memory(a, sides[0].film.pixels() as u64 * BYTES_PER_PIXEL)?;
     let options = Options { false_alarms: args.false_alarms, accept: args.accept, resolve: args.resolve, at: args.at };
     let [a_estimate, b_estimate] = sides.each_ref().map(|side| &side.estimate);
     let outcome = significance::test(a_estimate, b_estimate, &options).map_err(|what| Error::input(a, what))?;
