@@ -1,21 +1,26 @@
 //! `tallow explain`: lists the effects that a scene needs and measures what each of them costs.
-use super::{Exit, complain, print, print_json, readable};
+mod text;
+
+use super::{Exit, complain, print, print_json};
 use crate::cost::document::Estimate;
 use crate::cost::interval;
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceKind, DeviceOptions, FrameResources, Gpu, total_ms};
 use crate::layout::*;
 use crate::render::settings::{Allocate, Settings};
-use crate::render::{Job, Outputs, Renderer, called_for};
-use crate::report::table::{self, milliseconds};
+use crate::render::{Job, Outputs, Renderer, bytes_in_flight, called_for};
 use crate::scene::{self, Loaded, Scene, SceneFile};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use text::text;
 
 /// List every effect: on or off, what calls for it, and what it costs
+///
+/// Times are those of one sample per pixel of the film, made smaller if it has more than 128 x 128 pixels, or 256 x 256 where a
+/// graphics card renders. Bytes are those of the film in its own size.
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene file (.toml, .gltf, .glb) or model (.obj, .ply)
@@ -38,8 +43,20 @@ pub struct Args {
 #[derive(Serialize)]
 struct Report {
     effects: Vec<EffectRow>,
+    /// `None` where nothing was measured.
+    #[serde(flatten)]
+    sizes: Option<Sizes>,
     /// What was repaired in the scene.
     warnings: Vec<String>,
+}
+
+/// Width and height of the films that costs are of.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Sizes {
+    /// The film of all times.
+    pub timed_size: [u32; 2],
+    /// The film of all bytes, which is the scene's own.
+    pub film_size: [u32; 2],
 }
 
 /// One effect of a render that writes an EXR file. Costs that were not measured are `None`.
@@ -51,7 +68,7 @@ pub struct EffectRow {
     pub on: bool,
     /// Object, material or setting that calls for it; empty if it is off.
     pub called_for_by: String,
-    /// GPU time in ms of one sample per pixel with the effect compiled in.
+    /// GPU time in ms of one sample per pixel of [`Sizes::timed_size`] with the effect compiled in.
     pub gpu_ms_with: Option<f64>,
     /// GPU time in ms without it.
     pub gpu_ms_without: Option<f64>,
@@ -60,7 +77,8 @@ pub struct EffectRow {
     pub gpu_ms_added: Option<[f64; 2]>,
     /// Time in ms to compile the pipelines with the effect, less that without it; 0 if there is no measurable difference.
     pub compile_ms: Option<f64>,
-    /// Bytes of device memory that the effect adds: records of the scene that nothing else reads, and buffers of the render.
+    /// Bytes of device memory that the effect adds: records of the scene that nothing else reads, and buffers of the
+    /// render at [`Sizes::film_size`].
     pub bytes: Option<u64>,
 }
 
@@ -82,12 +100,10 @@ pub fn run(args: &Args) -> Result<Exit> {
         warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
     let mut effects = listed(&args.effects, &scene)?;
-    if !args.no_measure {
-        measure(&mut effects, args, scene)?;
-    }
+    let sizes = (!args.no_measure).then(|| measure(&mut effects, args, scene)).transpose()?;
     match args.json {
-        true => print_json(&Report { effects, warnings })?,
-        false => print(&text(&effects, !args.no_measure))?,
+        true => print_json(&Report { effects, sizes, warnings })?,
+        false => print(&text(&effects, sizes))?,
     }
     Ok(Exit::Done)
 }
@@ -131,8 +147,10 @@ struct Cost {
     /// Time to create the pipelines, plus the time by which the first run was slower than a later one, because drivers may
     /// compile then.
     compile_ms: f64,
-    /// Bytes of device memory that the renderer allocates.
+    /// Bytes of device memory that the renderer allocates, less those of samples in flight.
     bytes: u64,
+    /// Bytes of samples in flight in a render of the scene's own film.
+    in_flight: u64,
 }
 
 /// A renderer on a device of its own, for which nothing was compiled before.
@@ -143,11 +161,14 @@ struct Variant {
 }
 
 impl Variant {
-    fn new(args: &Args, scene: &Loaded, outputs: Outputs, effects: Effects) -> Result<Self> {
+    /// `whole`: the settings of the scene's own film.
+    fn new(args: &Args, scene: &Loaded, whole: &Settings, outputs: Outputs, effects: Effects) -> Result<Self> {
         let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
         let renderer = Renderer::specialised(&gpu, scene, &scene.settings, outputs, effects)?;
         let created: f64 = renderer.compile_times().iter().map(|(_, ms)| ms).sum();
-        let cost = Cost { gpu_ms: f64::INFINITY, compile_ms: created, bytes: gpu.allocated_bytes() };
+        let in_flight = |settings| bytes_in_flight(&gpu, scene, settings, renderer.effects());
+        let bytes = gpu.allocated_bytes().saturating_sub(in_flight(&scene.settings));
+        let cost = Cost { gpu_ms: f64::INFINITY, compile_ms: created, bytes, in_flight: in_flight(whole) };
         let mut variant = Self { renderer, frame: FrameResources::new(&gpu)?, cost };
         let first = variant.run()?;
         variant.cost.compile_ms += (first - variant.run()?).max(0.0);
@@ -178,12 +199,14 @@ fn listed(named: &[String], scene: &Loaded) -> Result<Vec<EffectRow>> {
 }
 
 /// Measures what each of the rows costs, in a small render of the scene.
-fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<()> {
+fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<Sizes> {
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
     let pixels = PIXELS_BY_KIND[usize::from(gpu.info().kind != DeviceKind::Cpu)];
+    let whole = scene.settings.clone();
     let scene = scene.with(|settings| shrink(settings, pixels));
+    let sizes = [scene.settings.pixels(), whole.pixels()].map(|pixels| pixels as u64);
     let base = called_for(&scene, &scene.settings, Outputs::FILTERED);
-    let usual = || Variant::new(args, &scene, Outputs::FILTERED, base);
+    let usual = || Variant::new(args, &scene, &whole, Outputs::FILTERED, base);
     let first = usual()?.cost.compile_ms;
     let mut usual = usual()?;
     usual.cost.compile_ms = usual.cost.compile_ms.min(first);
@@ -193,10 +216,9 @@ fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<()> {
         let then = effect.map_or(base, |effect| base.toggled(effect));
         let guides = effect.is_some();
         let outputs = Outputs { split_light: then.split_light, guides, counters: then.counters };
-        let (usual, other, pairs) = beside(&mut usual, || Variant::new(args, &scene, outputs, then))?;
+        let (usual, other, pairs) = beside(&mut usual, || Variant::new(args, &scene, &whole, outputs, then))?;
         let (with, without) = if row.on { (usual, other) } else { (other, usual) };
-        let bytes = with.bytes.saturating_sub(without.bytes);
-        row.bytes = Some(bytes + effect.map_or(0, |effect| scene_bytes(effect, &scene)));
+        row.bytes = Some(bytes_added(with, without, sizes) + effect.map_or(0, |effect| scene_bytes(effect, &scene)));
         // With and without it are different renders and not one picture at two costs; `tools/papers policies` compares them.
         if effect != Some(Effect::adaptive) {
             let added = |[usual, other]: [f64; 2]| if row.on { usual - other } else { other - usual };
@@ -208,7 +230,16 @@ fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<()> {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(())
+    let size = |settings: &Settings| [settings.width, settings.height];
+    Ok(Sizes { timed_size: size(&scene.settings), film_size: size(&whole) })
+}
+
+/// Bytes that buffers of the render take more, of a film of `whole` pixels, where films of `timed` pixels were measured.
+fn bytes_added(with: Cost, without: Cost, [timed, whole]: [u64; 2]) -> u64 {
+    let film = with.bytes.saturating_sub(without.bytes);
+    // A buffer that is not needed has one element, so that some bytes are no matter of size.
+    let per_pixel = (film + timed / 2) / timed;
+    film + per_pixel * (whole - timed) + with.in_flight.saturating_sub(without.in_flight)
 }
 
 /// Times that each variant runs beside the usual one, at least and at most: where other programs use the machine, until its two
@@ -329,26 +360,6 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
     bytes as u64
 }
 
-/// Formats the rows as a table, with a dash for costs that are not known, or, where none was `measured`, without their columns.
-pub fn text(rows: &[EffectRow], measured: bool) -> String {
-    let ms = |value: Option<f64>| value.map_or("-".to_owned(), milliseconds);
-    let costs = |r: &EffectRow| {
-        let added = |[low, high]: [f64; 2]| format!("{} to {}", milliseconds(low), milliseconds(high));
-        let added = r.gpu_ms_added.map_or("-".to_owned(), added);
-        let bytes = r.bytes.map_or("-".to_owned(), |bytes| bytes.to_string());
-        [ms(r.gpu_ms_with), ms(r.gpu_ms_without), added, ms(r.compile_ms), bytes]
-    };
-    let cells = |r: &EffectRow| {
-        let state = if r.on { "on" } else { "off" };
-        let costs = measured.then(|| costs(r)).into_iter().flatten();
-        [r.effect, state].map(str::to_owned).into_iter().chain(costs).chain([readable(&r.called_for_by)]).collect()
-    };
-    let costs = ["GPU ms with", "GPU ms without", "GPU ms added", "compile ms", "bytes"];
-    let costs = measured.then_some(costs).into_iter().flatten();
-    let header: Vec<_> = ["effect", ""].into_iter().chain(costs).chain(["called for by"]).collect();
-    table::text(&header, &rows.iter().map(cells).collect::<Vec<_>>())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -369,24 +380,5 @@ mod tests {
         assert_eq!(scene_bytes(Effect::emissive, &scene), 2 * (size_of::<Light>() + size_of::<AliasEntry>()) as u64);
         scene.materials.push(Material { bump_texture: 3, clearcoat_normal_texture: NONE, ..maps });
         assert_eq!(scene_bytes(Effect::coat_normals, &scene), 0, "a bump map has the same texels");
-    }
-
-    #[test]
-    fn costs_not_measured_are_dashes() {
-        let on = EffectRow {
-            effect: "ggx",
-            on: true,
-            called_for_by: "vase".to_owned(),
-            bytes: Some(64),
-            ..EffectRow::default()
-        };
-        let rows = [on, EffectRow { effect: "lens", ..EffectRow::default() }];
-        let words = |table: &str, line: usize| {
-            table.lines().nth(line).unwrap().split_whitespace().map(str::to_owned).collect::<Vec<_>>()
-        };
-        let table = text(&rows, true);
-        assert_eq!(words(&table, 1), ["ggx", "on", "-", "-", "-", "-", "64", "vase"]);
-        assert_eq!(words(&table, 2), ["lens", "off", "-", "-", "-", "-", "-"]);
-        assert_eq!(words(&text(&rows, false), 1), ["ggx", "on", "vase"]);
     }
 }

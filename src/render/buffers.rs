@@ -295,6 +295,12 @@ impl FilmBuffers {
         (records + if placed { PLACED } else { 0 }) as u64
     }
 
+    /// What a sample in flight takes.
+    pub fn bytes_per_path(effects: &Effects) -> u64 {
+        let place = if effects.adaptive { size_of::<uvec2>() } else { 0 };
+        (effects.records_per_path() * size_of::<vec4>() + place) as u64
+    }
+
     /// The tile that holds a batch's pixels; a batch never spans two.
     pub fn tile_of(&self, batch: &Batch) -> &FilmTile {
         let after = self.tiles.partition_point(|tile| tile.first_pixel <= batch.first_pixel);

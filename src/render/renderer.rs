@@ -352,6 +352,11 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     Effects { independent_sampler, large_lamps, weighed_lights, resampled_lights, soft_light, ..Effects::ALL }
 }
 
+/// Bytes of device memory that samples in flight take in a render with these effects.
+pub(crate) fn bytes_in_flight(gpu: &Gpu, scene: &Scene, settings: &Settings, effects: &Effects) -> u64 {
+    u64::from(paths_in_flight(gpu, scene, settings, effects)) * FilmBuffers::bytes_per_path(effects)
+}
+
 /// Paths per dispatch, whose samples, or what a wavefront keeps of them, have room.
 fn paths_in_flight(gpu: &Gpu, scene: &Scene, settings: &Settings, effects: &Effects) -> u32 {
     let wavefront = gpu.tuning().has_wavefront(scene.stack, settings.max_depth);
