@@ -1,6 +1,7 @@
 //! Metrics of the difference between a picture and its reference. Sums run over all pixels and channels in `f64`.
 use super::film::Picture;
 use crate::math::srgb::srgb_from_linear;
+use crate::threads;
 use serde::Serialize;
 
 /// Added to the denominator of relMSE, so that black reference pixels do not divide by 0.
@@ -26,13 +27,17 @@ pub struct Metrics {
 /// # Panics
 /// When their sizes differ.
 pub fn compare(test: &Picture, reference: &Picture) -> Metrics {
-    Metrics {
-        mse: mse(test, reference),
-        relmse: relmse(test, reference),
-        psnr: psnr(test, reference),
-        ssim: ssim(test, reference),
-        flip: flip(test, reference),
-    }
+    let shown = [shown(test), shown(reference)];
+    let others = || (mse(test, reference), relmse(test, reference), psnr_of(&shown), flip(&shown));
+    // SSIM takes as long as all others together.
+    let (ssim, (mse, relmse, psnr, flip)) = threads::within(|| rayon::join(|| ssim(&shown), others));
+    Metrics { mse, relmse, psnr, ssim, flip }
+}
+
+/// The picture as it is shown: sRGB-encoded and clamped to [0, 1].
+fn shown(picture: &Picture) -> Picture {
+    let pixels = picture.pixels.iter().map(|pixel| pixel.map(srgb_from_linear)).collect();
+    Picture { pixels, ..*picture }
 }
 
 fn values(picture: &Picture) -> impl Iterator<Item = f32> + '_ {
@@ -115,15 +120,18 @@ pub fn hdr_flip(test: &Picture, reference: &Picture) -> Option<f64> {
 /// # Panics
 /// When their sizes differ.
 pub fn psnr(test: &Picture, reference: &Picture) -> f64 {
-    let shown = |v: f64| f64::from(srgb_from_linear(v as f32));
-    -10.0 * mean(test, reference, |a, b| (shown(a) - shown(b)).powi(2)).log10()
+    psnr_of(&[shown(test), shown(reference)])
+}
+
+fn psnr_of([test, reference]: &[Picture; 2]) -> f64 {
+    -10.0 * mean(test, reference, |a, b| (a - b).powi(2)).log10()
 }
 
 /// SSIM (Wang, Bovik, Sheikh and Simoncelli 2004) with a Gaussian window of 11x11 pixels and standard deviation 1.5,
 /// K1 = 0.01, K2 = 0.03, averaged over all windows inside the picture and over R, G, B. scikit-image returns the same with
 /// `gaussian_weights=True, sigma=1.5, use_sample_covariance=False`.
-fn ssim(test: &Picture, reference: &Picture) -> Option<f64> {
-    let codes = |p: &Picture| values(p).map(|v| (srgb_from_linear(v) * 65_535.0).round() as u16).collect();
+fn ssim([test, reference]: &[Picture; 2]) -> Option<f64> {
+    let codes = |p: &Picture| values(p).map(|v| (v * 65_535.0).round() as u16).collect();
     let image = |p: &Picture| iqa::Image::srgb16(p.width, p.height, codes(p));
     // The only remaining error of the crate is a picture smaller than the window.
     iqa::ssim(&image(reference).ok()?, &image(test).ok()?, iqa::SsimOptions::default()).ok()
@@ -131,8 +139,8 @@ fn ssim(test: &Picture, reference: &Picture) -> Option<f64> {
 
 /// FLIP (Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images") at its default of 67 pixels per
 /// degree, a 4K screen of 0.7 m width seen from 0.7 m.
-fn flip(test: &Picture, reference: &Picture) -> f64 {
-    let codes = |p: &Picture| -> Vec<u8> { values(p).map(|v| (srgb_from_linear(v) * 255.0).round() as u8).collect() };
+fn flip([test, reference]: &[Picture; 2]) -> f64 {
+    let codes = |p: &Picture| -> Vec<u8> { values(p).map(|v| (v * 255.0).round() as u8).collect() };
     let image = |p: &Picture| nv_flip::FlipImageRgb8::with_data(p.width, p.height, &codes(p));
     let map = nv_flip::flip(image(reference), image(test), nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec();
     map.iter().map(|&e| f64::from(e)).sum::<f64>() / map.len() as f64
