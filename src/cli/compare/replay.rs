@@ -1,4 +1,5 @@
 //! Command lines that render a pixel of a file again.
+use super::report;
 use crate::cli::quoted;
 use crate::cli::render::{CHOICES, FRAME};
 use crate::image::Film;
@@ -21,7 +22,8 @@ pub fn commands(film: &Film, [x, y]: [u32; 2], stem: &str) -> Result<Vec<String>
         |key: &str| film.metadata.get(key).map(|name| format!("--{key} {} ", quoted(name))).unwrap_or_default();
     let view = CHOICES.map(chosen).concat();
     let Provenance { settings, samples: ranges, .. } = Provenance::of(film)?;
-    let taken = film.channel("samples").map(|counts| counts.at(y as usize * film.width as usize + x as usize) as u32);
+    let taken =
+        film.channel(report::SAMPLES).map(|counts| counts.at(y as usize * film.width as usize + x as usize) as u32);
     let command = |(i, range): (usize, &SampleRange)| {
         let alone = ranges.len() == 1;
         let part = if alone { String::new() } else { format!("-{i}") };

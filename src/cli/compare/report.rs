@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub struct Side {
     /// Where it was read.
     pub path: PathBuf,
-    /// All of it.
+    /// Its metadata and the counts of samples, by which pixels are rendered again.
     pub film: Film,
     /// What it says of its expectation.
     pub estimate: Estimate,
@@ -25,13 +25,16 @@ pub struct Report<'a> {
     pub outcome: Outcome,
 }
 
+/// The channel that tells how many samples a pixel has.
+pub const SAMPLES: &str = "samples";
+
 impl Side {
     /// Reads it; `errors` is an image of its standard errors, for one that does not tell its noise.
     ///
     /// # Errors
     /// [`Error::Input`].
     pub fn read(path: &Path, errors: Option<&Path>) -> Result<Self> {
-        let film = image::read(path)?;
+        let mut film = image::read(path)?;
         let estimate = match errors {
             None => Estimate::of_film(&film).map_err(|what| Error::input(path, what)),
             Some(file) => {
@@ -39,6 +42,7 @@ impl Side {
                 Estimate::with_errors(&film, &errors).map_err(|what| Error::input(file, what))
             }
         }?;
+        film.channels.retain(|channel| channel.name == SAMPLES);
         Ok(Self { path: path.to_owned(), film, estimate })
     }
 

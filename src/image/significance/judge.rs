@@ -63,7 +63,7 @@ impl<'a> Judge<'a> {
     /// Prepares the test of two images of one size.
     pub fn new(a: &'a Estimate, b: &'a Estimate, options: &'a Options) -> Self {
         let mut judge = Self { images: [a, b], options, brightness: [0.0; 3], usable: 0 };
-        let usable: Vec<usize> = (0..b.mean.len()).filter(|i| judge.is_usable(*i)).collect();
+        let usable: Vec<usize> = judge.usable_pixels().collect();
         let sum = |c: usize| usable.iter().map(|i| f64::from(b.mean[*i][c])).sum::<f64>();
         judge.brightness = [0, 1, 2].map(|c| sum(c) / usable.len().max(1) as f64);
         judge.usable = usable.len();
@@ -75,9 +75,13 @@ impl<'a> Judge<'a> {
         self.usable
     }
 
-    /// Tests all regions of a scale, or none if no region has enough pixels or samples.
-    pub fn judge(&self, partition: Partition) -> Option<Judged> {
-        let sums = if partition.scale == Scale::Pixel { Vec::new() } else { self.sums(&partition) };
+    /// Tests all regions of all scales, but none of a scale at which no region has enough pixels or samples.
+    pub fn judge(&self, partitions: Vec<Partition>) -> Vec<Judged> {
+        let sums = self.sums(&partitions);
+        partitions.into_iter().zip(sums).filter_map(|(partition, sums)| self.judge_scale(partition, sums)).collect()
+    }
+
+    fn judge_scale(&self, partition: Partition, sums: Vec<Sums>) -> Option<Judged> {
         let tested: Vec<_> = (0..partition.regions)
             .into_par_iter()
             .map(|region| {
@@ -138,6 +142,10 @@ impl<'a> Judge<'a> {
         sorted.into_iter().take(WORST).map(found).collect()
     }
 
+    fn usable_pixels(&self) -> impl Iterator<Item = usize> {
+        (0..self.images[1].mean.len()).filter(|i| self.is_usable(*i))
+    }
+
     fn is_usable(&self, pixel: usize) -> bool {
         self.images.iter().all(|image| samples(image, pixel) >= 2.0)
     }
@@ -153,34 +161,39 @@ impl<'a> Judge<'a> {
         f64::from(self.images[0].mean[pixel][c]) - f64::from(self.images[1].mean[pixel][c])
     }
 
-    fn sums(&self, partition: &Partition) -> Vec<Sums> {
-        let mut sums = vec![Sums::default(); partition.regions];
-        let pixels: Vec<_> = (0..self.images[0].mean.len())
-            .filter(|i| self.is_usable(*i))
-            .filter_map(|i| Some((i, partition.region(i)?)))
-            .collect();
-        for &(i, region) in &pixels {
-            let sums = &mut sums[region];
-            sums.pixels += 1;
-            for c in 0..3 {
-                (0..2).for_each(|k| sums.means[k][c] += f64::from(self.images[k].mean[i][c]));
-                let noise = self.noise(i, c);
-                sums.least[c] += noise.unequal * noise.pooled;
+    /// Sums over the regions of each scale; none for pixels. The noise of a pixel, which takes longest, is found once for all.
+    fn sums(&self, partitions: &[Partition]) -> Vec<Vec<Sums>> {
+        let regions = |p: &Partition| if p.scale == Scale::Pixel { 0 } else { p.regions };
+        let mut all: Vec<_> = partitions.iter().map(|p| vec![Sums::default(); regions(p)]).collect();
+        for i in self.usable_pixels() {
+            let least = [0, 1, 2].map(|c| self.noise(i, c)).map(|noise| noise.unequal * noise.pooled);
+            for (sums, partition) in all.iter_mut().zip(partitions) {
+                let Some(sums) = partition.region(i).and_then(|region| sums.get_mut(region)) else { continue };
+                sums.pixels += 1;
+                for c in 0..3 {
+                    (0..2).for_each(|k| sums.means[k][c] += f64::from(self.images[k].mean[i][c]));
+                    sums.least[c] += least[c];
+                }
             }
         }
-        for sums in &mut sums {
+        all.iter_mut().zip(partitions).for_each(|(sums, partition)| self.add_spread(partition, sums));
+        all
+    }
+
+    /// Makes means of the sums of the images, and adds how far pixels are off them.
+    fn add_spread(&self, partition: &Partition, sums: &mut [Sums]) {
+        for sums in &mut *sums {
             let n = sums.pixels.max(1) as f64;
             sums.means.iter_mut().flatten().for_each(|mean| *mean /= n);
         }
-        for &(i, region) in &pixels {
-            let sums = &mut sums[region];
+        for i in self.usable_pixels() {
+            let Some(sums) = partition.region(i).and_then(|region| sums.get_mut(region)) else { continue };
             for c in 0..3 {
                 let off = self.difference(i, c) - (sums.means[0][c] - sums.means[1][c]);
                 sums.squares[c] += off.powi(2);
                 sums.fourths[c] += off.powi(4);
             }
         }
-        sums
     }
 
     fn noise(&self, pixel: usize, c: usize) -> PixelNoise {

@@ -49,7 +49,6 @@ pub use estimate::{Estimate, Noise};
 pub use map::{Overlay, overlay};
 pub use region::{Scale, Where};
 
-use judge::Judged;
 use region::Partition;
 use serde::Serialize;
 
@@ -181,7 +180,7 @@ pub fn test(a: &Estimate, b: &Estimate, options: &Options) -> Result<Outcome, St
             a.mean.len()
         ));
     }
-    let judged: Vec<Judged> = Partition::all(a, b).into_iter().filter_map(|partition| judge.judge(partition)).collect();
+    let judged = judge.judge(Partition::all(a, b));
     let share = options.false_alarms / judged.len() as f64;
     let levels: Vec<Level> = judged.into_iter().map(|judged| judge.level(judged, share)).collect();
     let mut outcome = Outcome { verdict: Verdict::Different, levels, left_out };
