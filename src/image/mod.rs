@@ -21,9 +21,9 @@ pub use claim::Claim;
 pub use film::{Channel, FILTERED, Film, NOISY, Picture, SOFTWARE, Samples, Window};
 use frame::Frame;
 use output::Stream;
-#[cfg(feature = "cli")]
-pub(crate) use photo::encode_png;
 pub(crate) use photo::{BAND, bands, check_end, has_16_bits, picture};
+#[cfg(feature = "cli")]
+pub(crate) use photo::{codes, encode_png};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

@@ -20,16 +20,20 @@ const PIXELS_PER_BYTE: u64 = 8 * 1032;
 /// Largest number of bytes for colour profiles and texts.
 const TEXTS: u64 = 1 << 26;
 
+/// The codes of 8-bit sRGB: R, G, B of the first pixel, and so on.
+pub fn codes(picture: &Picture, options: &WriteOptions) -> Vec<u8> {
+    let code = |v: &f32| (tone::display(*v, options.exposure, options.tone_map) * 255.0).round() as u8;
+    picture.pixels.iter().flatten().map(code).collect()
+}
+
 /// Encodes 8-bit sRGB.
 ///
 /// # Errors
 /// When the picture has no pixels.
 pub fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, String> {
-    let code = |v: &f32| (tone::display(*v, options.exposure, options.tone_map) * 255.0).round() as u8;
-    let bytes: Vec<u8> = picture.pixels.iter().flatten().map(code).collect();
     let mut out = Vec::new();
     PngEncoder::new(&mut out)
-        .write_image(&bytes, picture.width, picture.height, ExtendedColorType::Rgb8)
+        .write_image(&codes(picture, options), picture.width, picture.height, ExtendedColorType::Rgb8)
         .map_err(|e| e.to_string())?;
     out.splice(PNG_HEADER..PNG_HEADER, SRGB);
     Ok(out)

@@ -2,7 +2,7 @@
 use crate::error::{Error, Result};
 use crate::image::{self, Film, WriteOptions, output};
 use ::image::codecs::gif::{GifEncoder, Repeat};
-use ::image::{Delay, Frame, RgbaImage};
+use ::image::{Delay, DynamicImage, Frame, RgbImage, RgbaImage};
 use std::path::Path;
 
 /// Pixels of the longer edge at most.
@@ -29,10 +29,9 @@ impl Preview {
     /// # Errors
     /// A sentence about a film that is no picture.
     pub fn add(&mut self, film: &Film, options: &WriteOptions) -> std::result::Result<(), String> {
-        let mut png = Vec::new();
-        image::encode(Path::new("frame.png"), film, options, &mut std::io::Cursor::new(&mut png))
-            .map_err(|e| e.to_string())?;
-        let whole = ::image::load_from_memory(&png).map_err(|e| e.to_string())?;
+        let picture = film.rec709(None)?;
+        let whole = RgbImage::from_raw(picture.width, picture.height, image::codes(&picture, options));
+        let whole = DynamicImage::from(whole.ok_or("holds no code for each pixel")?);
         let small = if whole.width().max(whole.height()) > EDGE { whole.thumbnail(EDGE, EDGE) } else { whole };
         self.0.push(small.into_rgba8());
         Ok(())
