@@ -34,6 +34,11 @@ pub fn halves(picture: &Picture) -> String {
     STANDARD.encode(bytes)
 }
 
+/// Characters of what [`halves`] returns: 8 for the 6 bytes of a pixel.
+pub fn length_of_halves(picture: &Picture) -> usize {
+    8 * picture.pixels.len()
+}
+
 /// Base64 of a PNG file.
 ///
 /// # Errors
@@ -62,5 +67,6 @@ mod tests {
         let picture = Picture { width: 1, height: 1, pixels: vec![[1.0, 1e9, -2.0]] };
         // 0x3c00, 0x7bff and 0xc000.
         assert_eq!(STANDARD.decode(halves(&picture)).unwrap(), [0x00, 0x3c, 0xff, 0x7b, 0x00, 0xc0]);
+        assert_eq!(halves(&picture).len(), length_of_halves(&picture));
     }
 }

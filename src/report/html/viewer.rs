@@ -85,8 +85,7 @@ impl Viewer<'_> {
         let mut shots: Vec<(usize, Shot)> = Vec::new();
         let (mut missing, mut left) = (Vec::new(), budget);
         for index in order {
-            let shot = self.shot(index).filter(|shot| shot.png.len() + shot.halves.len() <= left);
-            match shot {
+            match self.shot(index, left) {
                 Some(shot) => {
                     left -= shot.png.len() + shot.halves.len();
                     shots.push((index, shot));
@@ -102,11 +101,13 @@ impl Viewer<'_> {
         (shots, missing.into_iter().map(|index| self.images[index].name.as_str()).collect())
     }
 
-    /// `None` for an image without pixels.
-    fn shot(&self, index: usize) -> Option<Shot<'_>> {
+    /// `None` for an image without pixels, or of more than `left` characters. What is too long is not encoded as far as its length
+    /// is known before.
+    fn shot(&self, index: usize, left: usize) -> Option<Shot<'_>> {
         let image = &self.images[index];
         let crop = pixels::middle(image.picture, LARGEST);
-        let png = pixels::png(&crop.picture).ok()?;
+        let left = left.checked_sub(pixels::length_of_halves(&crop.picture))?;
+        let png = pixels::png(&crop.picture).ok().filter(|png| png.len() <= left)?;
         let halves = pixels::halves(&crop.picture);
         let is_reference = self.reference == Some(index);
         Some(Shot { image, key: is_reference.then_some('0'), is_reference, crop, png, halves })
