@@ -25,8 +25,10 @@ struct Receiver {
     float odds_beyond_cosine; // added to the cosine in the odds of a light, for lobes that reflect more than the cosine says
 };
 
-// A light without extent that is chosen less often brings the noise of that choice: a filter takes it with what is soft.
-const float SHARP_PROBABILITY = 0.7;
+// A light without extent that is chosen less often brings the noise of that choice: a filter takes it with what is soft. A sun that is
+// chosen as often as can be beside a lamp, .75, left dark specks: filtered with the rest, relMSE .041 in place of .057 at 2 samples,
+// .0051 of .028 at 4, FLIP .025 of .040 and .013 of .018.
+const float SHARP_PROBABILITY = 0.9;
 
 const float MAX_ODDS = 1e30;        // so that sums of odds stay finite
 const float BELOW_ONE = 0.99999994; // the largest number below 1

@@ -170,9 +170,9 @@ impl<'a> Judge<'a> {
             for (sums, partition) in all.iter_mut().zip(partitions) {
                 let Some(sums) = partition.region(i).and_then(|region| sums.get_mut(region)) else { continue };
                 sums.pixels += 1;
-                for c in 0..3 {
+                for (c, least) in least.iter().enumerate() {
                     (0..2).for_each(|k| sums.means[k][c] += f64::from(self.images[k].mean[i][c]));
-                    sums.least[c] += least[c];
+                    sums.least[c] += least;
                 }
             }
         }

@@ -50,7 +50,7 @@ choices! {
         /// `indirect` holds light of two bounces and more, over the albedo of what is seen first.
         Indirect,
         /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what a point, spot
-        /// or directional light brings that 70 % of the samples or more choose: its shadows are sharp, and its noise is that of the choice
+        /// or directional light brings that 90 % of the samples or more choose: its shadows are sharp, and its noise is that of the choice
         /// and of what edges and masks hide.
         #[default]
         Soft,
