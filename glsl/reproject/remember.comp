@@ -111,8 +111,8 @@ uint kept_by_spread(uint pixel, vec3 plane, uint count, bool edge, out float noi
     }
     float variance = within / max(degrees, 1.0), spread = (squares - dot(sum, sum) / n) / (n - 1.0);
     float beyond = max(spread - SURE_SPREAD * variance * inverse / n - LEAST_SPREAD * dot(origin, origin), 0.0);
-    // Single samples do not tell their noise.
     noise = others.y > 0.0 ? others.x / others.y * others.z * others.z / max(dot(beside, beside), 1e-30) : UNKNOWN_NOISE;
+    // Single samples do not tell their noise.
     return degrees > 0.0 ? worth(count, (edge ? SHARE_AT_EDGE : SHARE_OF_SPREAD) * beyond / max(variance - beyond, 1e-30)) : count;
 }
 
