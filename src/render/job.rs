@@ -83,7 +83,7 @@ impl<'a> Job<'a> {
 
     /// Runs it. Before each step `between` is told how far it is, may read the renderer's buffers (the renderer waits), and
     /// says whether to go on: that is the place to show progress, to look at a clock or a button, and to write a
-    /// [`Job::film`] every so often. Of the last step the status tells that is returned.
+    /// [`Job::film`] every so often. What the last step brought is told by the returned status alone.
     ///
     /// # Errors
     /// As [`Renderer::run`] and [`Renderer::resume`], and those of `between`.
