@@ -1,5 +1,6 @@
 // Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, and before them `previous`,
 // `guide` (of the new frame), `history` and `push` (ReprojectPush).
+#include "shared/largest_channel.glsl"
 
 // A hit is of the surface of a point if it lies no farther from the plane there than this, in widths of a pixel.
 const float PLANE_DISTANCE = 0.5;
@@ -32,7 +33,7 @@ float view_change(Surface s) {
         vec3 from = mirror(k == 0 ? before : after, side * s.normal);
         vec3 a = scattered(s, bsdf, before, from), b = scattered(s, bsdf, after, from);
         vec3 share = abs(b - a) / max(max(a, b), vec3(1e-30));
-        change = max(change, max(share.r, max(share.g, share.b)));
+        change = max(change, largest_channel(share));
     }
     return change;
 }
