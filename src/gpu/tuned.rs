@@ -3,13 +3,15 @@ use super::{DeviceKind, Gpu, Tuning};
 use crate::shaders::shared;
 
 impl Gpu {
-    /// Among how many lanes kernels deal triangles; none where they do not.
+    /// Among how many lanes kernels deal triangles; none where they do not. Dealing needs all lanes of a subgroup at the same place of
+    /// the code. Drivers that run on a CPU keep them together; a GPU may not: on an H200 rays missed triangles, and took longer.
     pub fn deal(&self) -> shared::deal::Constants {
         let (info, tuning) = (self.info(), self.tuning());
         let lanes = info.subgroup_size;
         let whole =
             info.subgroup_size_fixed && matches!(lanes, 4 | 8 | 16 | 32) && tuning.workgroup.is_multiple_of(lanes);
-        let gains = info.subgroup_shuffle && (info.kind != DeviceKind::Cpu || shuffles_at_once(lanes, has_avx2()));
+        let together = info.subgroup_shuffle && info.kind == DeviceKind::Cpu;
+        let gains = together && shuffles_at_once(lanes, has_avx2());
         shared::deal::Constants { lanes: if tuning.deals && gains && whole { lanes } else { 0 } }
     }
 
