@@ -7,6 +7,7 @@ use crate::denoise::{Noisy, Recipe, Timed, filter, host_bytes, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime};
 use crate::image::Picture;
+use crate::machine::wake;
 use crate::memory;
 use crate::render::{Job, Renderer, Status, StopReason, called_for, film};
 use crate::scene::{Change, Scene};
@@ -69,6 +70,7 @@ impl<'a> Session<'a> {
         if self.warm[shot].is_none() && !self.warm_up(shot, seed, stop)? {
             return Ok(None);
         }
+        wake(self.gpu)?;
         let Some((status, wall)) = self.shoot(shot, seed, stop)? else {
             self.forget(shot)?;
             return Ok(None);

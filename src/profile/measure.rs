@@ -6,7 +6,7 @@ use crate::denoise::filter::{FilterSettings, Row};
 use crate::denoise::{Denoiser, Noisy};
 use crate::error::Result;
 use crate::gpu::{Calibration, FrameResources, Gpu};
-use crate::machine::device_mhz;
+use crate::machine::{device_mhz, wake};
 use crate::render::settings::Settings;
 use crate::render::{Counters, Job, Outputs, Renderer};
 use crate::scene::Scene;
@@ -59,10 +59,13 @@ pub fn measure(
     gpu.check_clock()?;
     let outputs = Outputs::for_filter(filter.is_some());
     let counters = count_rays(gpu, scene, settings, Outputs { counters: true, ..outputs })?;
+    wake(gpu)?;
     let ceilings = Ceilings::measure(gpu)?;
     let renderer = Renderer::new(gpu, scene, settings, outputs)?;
     let denoiser = filter.map(|row| denoiser(gpu, &renderer, row)).transpose()?;
+    wake(gpu)?;
     let before = device_mhz(gpu.info());
+    wake(gpu)?; // asking may take a while
     let frames = Workload { gpu, renderer: &renderer, denoiser: denoiser.as_ref() }.run(count, done)?;
     let device_mhz = before.zip(device_mhz(gpu.info())).map(|(before, after)| [before, after]);
     let split_light = renderer.effects().split_light;

@@ -10,6 +10,7 @@ mod record;
 mod spread;
 pub mod work;
 
+pub use crate::machine::wake;
 pub use ceilings::Ceilings;
 pub use compare::{Change, Comparison, Row, Verdict};
 pub use frames::{FrameRun, Frames, Workload};

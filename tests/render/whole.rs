@@ -325,7 +325,8 @@ fn every_pixel_of_a_mirror_in_the_furnace_is_white() {
         stats.iter().flat_map(|s| s.mean).map(|v| (v - 1.0).abs()).fold(0.0, f32::max)
     };
     let off = worst(1.0);
-    assert!(off < 1e-5, "off by {off:e}");
+    // Reflectances of GPUs round by more than lavapipe's.
+    assert!(off < 1e-4, "off by {off:e}");
     assert!(worst(0.999) > 5e-4, "control: a mirror that absorbs");
     support::assert_silent(&gpu);
 }

@@ -16,8 +16,13 @@ fn kernels_agree_with_their_twins() {
                 let (device, _) = run(&gpu, row, &input, &settings).unwrap();
                 let host = (row.reference)(&input, &settings);
                 let off = apart(&device, &host, 1.0);
-                // An eps of 0 leaves matrices whose condition is the pivots' limit, 1e5.
-                assert!(off < 5e-4, "{} {width}x{height}: {off} apart with {settings:?}", row.name);
+                // An eps of 0 leaves matrices whose condition is the pivots' limit, 1e5. GPUs add in another order than the twin.
+                let exact = gpu.info().kind == DeviceKind::Cpu || settings.guided.eps.iter().all(|&eps| eps > 0.0);
+                assert!(
+                    off < if exact { 5e-4 } else { 1e-2 },
+                    "{} {width}x{height}: {off} apart with {settings:?}",
+                    row.name
+                );
                 if width * height > 1 {
                     let mut turned = host.clone();
                     turned.rotate_right(1);

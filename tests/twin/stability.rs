@@ -244,7 +244,7 @@ fn sub_sampled_images_are_in_painted() {
                 let most = match row.name {
                     "guided" => 4.0 * 3.0 / 49.0,
                     "auto" => 4.0 * 3.0 / 9.0,
-                    _ => 0.0,
+                    _ => 1e-6,
                 };
                 assert!(worst <= most, "{}: {worst}", row.name);
             }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::gpu::{PerBlock, thread_items};
 use tallow::layout::PixelStats;
-use tallow::profile::median;
+use tallow::profile::{median, wake};
 use tallow::render::pass::apportion::Apportion;
 use tallow::render::pass::counts::Counts;
 use tallow::render::pass::sample_list;
@@ -37,6 +37,7 @@ fn main() -> Result<()> {
         let plan = Plan { pixels, budget: u64::from(pixels) * spp, limit: None, share: Share::Next, rounds: 1 };
         let range = PathRange { first: 0, paths: pixels, round: 0, rounds: 1 };
         let mut passes: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+        wake(&gpu)?;
         for _ in 0..=RUNS {
             let times = gpu.run(&mut frame, |rec| {
                 apportion.record(rec, &stats, &counts, &plan)?;

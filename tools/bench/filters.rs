@@ -12,7 +12,7 @@ use std::time::Duration;
 use tallow::denoise::filter::{self, Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime, total_ms};
 use tallow::layout::Guide;
-use tallow::profile::median;
+use tallow::profile::{median, wake};
 
 /// Pause after a peer's run, whose threads spin for a while before they sleep and would take our cores.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -169,6 +169,7 @@ fn main() -> Result<()> {
         if peer.is_some() {
             sleep(PAUSE);
         }
+        wake(&gpu)?;
         for ours in &mut ours {
             let times = gpu.run(&mut frame, |rec| ours.filter.record(rec, &planes))?;
             if round > 0 {

@@ -11,11 +11,11 @@ use obvhs::ray::{Ray, RayHit as HostHit};
 use obvhs::rt_triangle::RtTriangle;
 use rayon::prelude::*;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location, Tracing};
 use tallow::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
 use tallow::math::warp::{basis_from_normal, warp_cosine_hemisphere};
-use tallow::profile::median;
+use tallow::profile::{median, wake};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
@@ -48,10 +48,6 @@ struct Launch {
 const CPU: Launch = Launch { side: 512, per_thread: 128 };
 /// A GPU hides the latency of its memory by hundreds of thousands of threads. Each takes as many as those of `path_extend.comp`.
 const GPU: Launch = Launch { side: 2048, per_thread: 8 };
-
-/// How long the device traces untimed before each round: GPUs lower their clocks while the host traces, and take a while to raise them.
-/// After 200 ms an H200 was back in one case and not in another.
-const WARM_UP: Duration = Duration::from_secs(1);
 
 /// A hit: distance and triangle in leaf order, or [`NONE`] on a miss. For any-hit rays a hit can have any values.
 type Found = (f32, u32);
@@ -173,12 +169,9 @@ impl Device {
         Ok(self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect())
     }
 
-    /// Rays per second of a device that has been busy for [`WARM_UP`].
+    /// Rays per second.
     fn rate(&mut self, any_hit: bool) -> Result<f64> {
-        let begun = Instant::now();
-        while begun.elapsed() < WARM_UP {
-            self.trace(any_hit)?;
-        }
+        wake(&self.gpu)?;
         Ok(self.rays.len() as f64 / self.trace(any_hit)?)
     }
 }

@@ -3,7 +3,7 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use std::time::Instant;
 use tallow::gpu::{FrameResources, Gpu, total_ms};
-use tallow::profile::median;
+use tallow::profile::{median, wake};
 use tallow::render::{Outputs, Renderer, traces_paths};
 use tallow::report::table;
 use tallow::scene::description::*;
@@ -46,6 +46,7 @@ fn measure(
         let posed = begun.elapsed().as_secs_f64() * 1e3;
         cost = change.deformed.first().map_or(cost, |d| d.cost);
         let mut recorded = 0.0;
+        wake(gpu)?;
         let mut passes = gpu.run(&mut frame, |rec| {
             let begun = Instant::now();
             renderer.update(rec, scene, &change)?;

@@ -7,6 +7,7 @@ use tallow::denoise::{Clean, Filtered, Noisy, Recipe};
 use tallow::gpu::{FrameResources, Gpu, PassTime, total_ms};
 use tallow::image::Picture;
 use tallow::layout::Camera;
+use tallow::profile::wake;
 use tallow::render::{Moves, Outputs, Renderer, Reproject, Step};
 use tallow::scene::{Change, Loaded};
 
@@ -50,6 +51,7 @@ impl Film {
     /// Renders a frame from a camera, after what has changed in the scene. Returns its passes.
     pub fn shoot(&mut self, camera: Camera, change: Option<(&Loaded, &Change)>, seed: u32) -> Result<Vec<PassTime>> {
         let (gpu, renderer) = (&self.gpu, &mut self.renderer);
+        wake(gpu)?;
         let mut times = Vec::new();
         if let Some((scene, change)) = change {
             times.extend(gpu.run(&mut self.frame, |rec| renderer.update(rec, scene, change))?);
