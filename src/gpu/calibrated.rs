@@ -14,8 +14,8 @@ pub(super) enum CalibratedExtension {
 }
 
 impl CalibratedExtension {
-    /// The ratified one first.
-    pub const BY_PREFERENCE: [Self; 2] = [Self::Khr, Self::Ext];
+    /// The older one first: validation layers before 1.3.268 warn of the other on every device.
+    pub const BY_PREFERENCE: [Self; 2] = [Self::Ext, Self::Khr];
 
     /// As a device lists it.
     pub fn name(self) -> &'static CStr {
