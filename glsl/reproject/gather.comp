@@ -86,7 +86,9 @@ uint reason_to_leave(uint pixel, uint from, bool edge, float view, inout Carried
         if (c.count == 0u) return DROPPED_LIGHT;
     }
     c.count = worth_in_view(c.count, view, from);
-    return c.count == 0u ? DROPPED_VIEW : 0u;
+    if (c.count == 0u) return DROPPED_VIEW;
+    c.count = shared_out(c.count, s.position);
+    return 0u;
 }
 
 // What a pixel takes of the four around a point of the last film; or why none, in its word.

@@ -61,6 +61,7 @@ uint moved(uint pixel, Carried c) {
     }
     c.count = worth_in_view(c.count, view_change(s), pixel);
     if (c.count == 0u) return dropped(DROPPED_VIEW);
+    c.count = shared_out(c.count, s.position);
     vec3 film = film_from_point(camera, s.position, push.size);
     uint reason = film.z > 0.0 && finite(film) ? offer(pixel, s, film.xy, c.edge, c.count < push.spp) : DROPPED_OUTSIDE;
     return reason == 0u ? word_of(Carried(c.count, c.age + 1u, c.edge, c.back)) : dropped(reason);

@@ -42,3 +42,14 @@ float view_change(Surface s) {
 uint worth_in_view(uint count, float change, uint pixel) {
     return worth(count, change / max(push.view * push.view * History_noise(history, pixel), 1e-30));
 }
+
+// Of samples that several new pixels take, because each of them is smaller at the point than the old one was, a share each: filters take
+// the noise of neighbours for independent. A zoom by 1.4 of the area a frame leaves .65 to 1.04 of the error of frames that carry nothing
+// behind `auto`, in place of 1.04 to 2.95. Where no filter is to follow all count, since .14 of that error would become .25.
+uint shared_out(uint count, vec3 point) {
+    if (!FX_SPLIT) return count;
+    vec3 before = point - previous.position, after = point - camera.position;
+    float ratio = pixel_width(previous, push.size) / max(pixel_width(camera, push.size), 1e-30);
+    float magnified = ratio * ratio * dot(before, before) / max(dot(after, after), 1e-30);
+    return magnified > 1.0 ? uint(max(float(count) / magnified + 0.5, 1.0)) : count;
+}

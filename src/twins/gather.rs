@@ -119,7 +119,11 @@ impl Reprojection<'_> {
             return DROPPED_LIGHT;
         }
         c.count = self.worth_in_view(c.count, view, h);
-        if c.count == 0 { DROPPED_VIEW } else { 0 }
+        if c.count == 0 {
+            return DROPPED_VIEW;
+        }
+        c.count = self.shared_out(c.count, s.position);
+        0
     }
 
     /// What a pixel takes, or its word with why it takes nothing.

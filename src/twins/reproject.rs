@@ -283,6 +283,15 @@ impl Reprojection<'_> {
         worth(count, change / (self.push.view * self.push.view * h.noise).max(1e-30))
     }
 
+    /// Of samples that several new pixels take, because each of them is smaller at the point than the old one was, a share each.
+    pub(super) fn shared_out(&self, count: u32, point: Vec3) -> u32 {
+        let [before, after] = [self.previous, self.camera].map(|c| (point - Vec3::from(c.position)).length_squared());
+        let width = |camera| pixel_width(camera, self.push.size);
+        let ratio = width(&self.previous) / width(&self.camera).max(1e-30);
+        let magnified = ratio * ratio * before / after.max(1e-30);
+        if magnified > 1.0 { (count as f32 / magnified + 0.5).max(1.0) as u32 } else { count }
+    }
+
     /// How many of a pixel's samples the changed light leaves.
     pub(super) fn after_change(&self, pixel: usize, count: u32) -> u32 {
         if self.push.moved == 0 {
@@ -331,6 +340,7 @@ impl Reprojection<'_> {
         if c.count == 0 {
             return dropped(DROPPED_VIEW);
         }
+        c.count = self.shared_out(c.count, s.position);
         let film = film_from_point(&self.camera, s.position, self.push.size);
         let ahead = film.z > 0.0 && film.is_finite();
         let reason = if ahead { self.offer(guide, winner, pixel, c, &s, film.truncate()) } else { DROPPED_OUTSIDE };

@@ -443,6 +443,27 @@ fn the_changed_view_is_accounted() {
     assert_silent(&gpu);
 }
 
+/// Filters take neighbours' noise for independent: where each pixel becomes four, a quarter of its samples counts in each. Without a filter
+/// all count, and so they do where the picture shrinks.
+#[test]
+fn pixels_of_a_zoom_share_the_samples_that_they_take() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/scene.toml", |s| (s.width, s.height, s.spp) = (48, 36, 16));
+    let most = |mut film: Film, times: f32| {
+        film.frame(film.camera);
+        let wide = |edge: [f32; 3]| edge.map(|v| v * times);
+        let Camera { right, up, .. } = film.camera;
+        film.begin(Camera { right: wide(right), up: wide(up), ..film.camera });
+        film.carried().into_iter().map(|word| Carried::of(word).count).max().unwrap()
+    };
+    for way in WAYS {
+        let filtered = [0.5, 2.0].map(|times| most(Film::new(&gpu, &scene, by(way)), times));
+        let plain = [0.5, 2.0].map(|times| most(Film::unfiltered(&gpu, &scene, by(way)), times));
+        assert_eq!((filtered, plain), ([4, 16], [16, 16]), "{way:?}");
+    }
+    assert_silent(&gpu);
+}
+
 /// A floor of rough metal under a lamp, and a camera that moves slowly; all light times `scale`.
 fn metal_floor(scale: f64) -> Loaded {
     let mut scene = Workplace::new().scene(&format!(

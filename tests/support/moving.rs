@@ -41,16 +41,22 @@ pub struct Film {
 impl Film {
     /// Of a scene in which the camera alone moves.
     pub fn new(gpu: &Gpu, scene: &Loaded, settings: Reproject) -> Self {
-        Self::following(gpu, scene, settings, Moves::Camera)
+        Self::following(gpu, scene, settings, Moves::Camera, Outputs::FILTERED)
+    }
+
+    /// The same, of what no filter follows.
+    pub fn unfiltered(gpu: &Gpu, scene: &Loaded, settings: Reproject) -> Self {
+        let outputs = Outputs { split_light: false, ..Outputs::FILTERED };
+        Self::following(gpu, scene, settings, Moves::Camera, outputs)
     }
 
     /// Of one in which anything may.
     pub fn moving(gpu: &Gpu, scene: &Loaded, settings: Reproject) -> Self {
-        Self::following(gpu, scene, settings, Moves::Scene)
+        Self::following(gpu, scene, settings, Moves::Scene, Outputs::FILTERED)
     }
 
-    fn following(gpu: &Gpu, scene: &Loaded, settings: Reproject, moves: Moves) -> Self {
-        let mut renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::FILTERED).unwrap();
+    fn following(gpu: &Gpu, scene: &Loaded, settings: Reproject, moves: Moves, outputs: Outputs) -> Self {
+        let mut renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
         renderer.keep_history(settings, moves).unwrap();
         let camera = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
         Self { gpu: gpu.clone(), renderer, frame: FrameResources::new(gpu).unwrap(), camera, begun: false }
