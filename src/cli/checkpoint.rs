@@ -1,7 +1,7 @@
 //! `--checkpoint`: writes an unfinished render to a file at regular intervals, so that a crash loses only the work since
 //! the last one.
 use super::complain;
-use super::files::{Files, Item, partial_name};
+use super::files::{Files, Item, partial_name, scene_name};
 use crate::image::{self, Film, WriteOptions, output};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -25,8 +25,7 @@ pub fn path(outputs: &[PathBuf], scene: &Path) -> PathBuf {
 
 /// Default output: the name of the scene with the extension .exr, in the working folder.
 pub fn default_output(scene: &Path) -> PathBuf {
-    // `.` and `..` have no file name.
-    let mut name = scene.file_stem().unwrap_or("image".as_ref()).to_owned();
+    let mut name = scene_name(scene);
     name.push(".exr");
     name.into()
 }

@@ -5,6 +5,7 @@ mod options;
 mod output;
 mod points;
 
+use super::files::scene_name;
 use super::{Exit, complain, fail_on_messages, interrupt};
 use crate::cost::document::SceneInfo;
 use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, others, reference};
@@ -50,7 +51,13 @@ fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> R
     let judged = motion.as_ref().map(|motion| motion.judged);
     let command = |candidate| points::command(path, judged, &settings, candidate, gpu.traces_by_ray_query());
     Ok(Plan {
-        scene: SceneInfo { path: path.display().to_string(), name: name(path), width, height, judged },
+        scene: SceneInfo {
+            path: path.display().to_string(),
+            name: scene_name(path).to_string_lossy().into_owned(),
+            width,
+            height,
+            judged,
+        },
         commands: candidates.iter().map(command).collect(),
         motion,
         base,
@@ -115,13 +122,6 @@ fn no_scene() -> Error {
     Error::Usage("name a scene to measure, or an image with --filter-only (see tallow cost --help)".to_owned())
 }
 
-/// A scene's name: that of its folder if the file itself is called "scene".
-fn name(path: &Path) -> String {
-    let text = |part: Option<&std::ffi::OsStr>| part.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let (stem, folder) = (text(path.file_stem()), text(path.parent().and_then(Path::file_name)));
-    if stem == "scene" && !folder.is_empty() { folder } else { stem }
-}
-
 /// Runs that were measured: those of other renderers are read anew each time.
 fn runs(document: &Document) -> usize {
     document.points.iter().filter(|point| !point.is_other).map(|point| point.runs.len()).sum()
@@ -130,18 +130,5 @@ fn runs(document: &Document) -> usize {
 impl Args {
     fn budget(&self) -> Option<Duration> {
         (self.budget_minutes > 0.0).then(|| Duration::from_secs_f64(self.budget_minutes * 60.0))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn scenes_have_names() {
-        assert_eq!(
-            ["scenes/bust/scene.toml", "a/room.toml", "scene.toml"].map(|p| name(Path::new(p))),
-            ["bust", "room", "scene"]
-        );
     }
 }

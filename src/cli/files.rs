@@ -5,7 +5,15 @@ use crate::error::{Error, Result};
 use crate::image::output::{self, Stream};
 use crate::image::{self, Film, WriteOptions};
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+
+/// A scene's name: that of its file, or of the folder of a file called "scene", as many are.
+pub fn scene_name(path: &Path) -> OsString {
+    let stem = path.file_stem().unwrap_or("image".as_ref()); // `.` and `..` have no file name
+    let folder = path.parent().and_then(Path::file_name).filter(|_| stem == "scene");
+    folder.unwrap_or(stem).to_owned()
+}
 
 /// A file to write, and the function that writes its content.
 pub struct Item<'a> {
@@ -211,6 +219,12 @@ mod tests {
 
     fn read(path: &Path) -> String {
         std::fs::read_to_string(path).unwrap()
+    }
+
+    #[test]
+    fn scenes_have_names() {
+        let paths = ["scenes/bust/scene.toml", "a/scene.gltf", "a/room.toml", "scene.toml", ".."];
+        assert_eq!(paths.map(|path| scene_name(Path::new(path))), ["bust", "a", "room", "scene", "image"]);
     }
 
     #[test]

@@ -44,7 +44,8 @@ pub enum EffectChoice {
 pub struct Args {
     /// Scene file (.toml, .gltf, .glb) or model (.obj, .ply)
     pub scene: PathBuf,
-    /// Image to write: .exr (all layers), .png or .hdr; may be given several times [default: the scene's name + .exr]
+    /// Image to write: .exr (all layers), .png or .hdr; may be given several times [default: the scene's name, its
+    /// folder's for a file called scene, + .exr]
     #[arg(short, long = "output", value_name = "FILE")]
     pub outputs: Vec<PathBuf>,
     /// Effects to compile in

@@ -1,5 +1,6 @@
 //! `tallow cost --filter-only`: filters on a given image.
-use super::{Args, Folder, finish, name, runs, watched};
+use super::{Args, Folder, finish, runs, watched};
+use crate::cli::files::scene_name;
 use crate::cli::filter::options::Overrides;
 use crate::cli::{Exit, fail_on_messages, quoted};
 use crate::cost::document::SceneInfo;
@@ -24,7 +25,7 @@ pub fn run(args: &Args, image: &Path) -> Result<Exit> {
         film: &film,
         scene: SceneInfo {
             path: image.display().to_string(),
-            name: name(image),
+            name: scene_name(image).to_string_lossy().into_owned(),
             width: size[0],
             height: size[1],
             judged: None,

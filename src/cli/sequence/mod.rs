@@ -6,6 +6,7 @@ mod stage;
 mod survey;
 
 use super::common::{check_fps, with_ranges};
+use super::files::scene_name;
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
 use crate::error::{Error, Result};
@@ -35,7 +36,7 @@ use std::time::{Duration, Instant};
 #[command(
     mut_args(with_ranges(Reproject::default().entries())),
     mut_arg("outputs", |arg| arg.help("Image to write: .exr (all layers), .png or .hdr, with #### for the number of the frame; may be \
-        given several times [default: the scene's name + .####.exr]")),
+        given several times [default: the scene's name, its folder's for a file called scene, + .####.exr]")),
     mut_args(|arg| { let hide = OF_ONE.iter().any(|(id, _)| arg.get_id() == id); if hide { arg.hide(true) } else { arg } }),
 )]
 pub struct Args {
@@ -86,8 +87,7 @@ impl Args {
     fn of_frame(&self, number: u32) -> Result<render::Args> {
         let mut args = self.render.clone();
         if args.outputs.is_empty() {
-            let scene = self.render.scene.with_extension("");
-            let mut name = scene.file_name().unwrap_or("frame".as_ref()).to_owned();
+            let mut name = scene_name(&self.render.scene);
             name.push(".####.exr");
             args.outputs = vec![name.into()];
         }
