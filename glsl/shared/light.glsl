@@ -239,8 +239,8 @@ bool is_triangle_light(uint kind) { return kind == LIGHT_TRIANGLE || kind == LIG
 
 bool is_sphere_light(uint kind) { return FX_SPHERES && kind == LIGHT_SPHERE; }
 
-// What a light that is not infinitely far away brings to a receiver from which it is seen, up to a factor that all have. That of a lamp
-// is taken at its middle, with cosines that are larger by `rim`: so large they may be elsewhere on it.
+// What a light of value 1 that is not infinitely far away brings to a receiver from which it is seen, up to a factor that all have. That of
+// a lamp is taken at its middle, with cosines that are larger by `rim`: so large they may be elsewhere on it.
 float unshadowed(Light light, Receiver r) {
     vec3 to_light = light.a - r.position;
     float extent2 = 0.0, emits = 1.0; // the square of how far it reaches from its middle; its intensity, of value 1
@@ -266,7 +266,7 @@ float unshadowed(Light light, Receiver r) {
         emits = towards > 0.0 ? 0.5 * (towards + rim * length(n)) : 0.0;
     }
     if (FX_SPOT && light.kind == LIGHT_SPOT) emits = spot_share(light, w);
-    float brings = min(emits * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2, MAX_ODDS);
+    float brings = emits * (cosine + r.odds_beyond_cosine) / d2;
     return cosine > 0.0 || r.lets_light_through ? brings : 0.0;
 }
 
@@ -288,7 +288,7 @@ Light choose_by_share(Receiver r, float u) {
         if (is_triangle_light(light.kind) || light.kind == LIGHT_SPHERE) break;
         if (!is_point_or_spot(light.kind)) continue;
         group += light.probability;
-        float brings = unshadowed(light, r);
+        float brings = min(unshadowed(light, r) * luminance(light.value), MAX_ODDS);
         sum += brings;
         number += brings > 0.0 ? 1.0 : 0.0;
         float share = brings > 0.0 ? (even ? 1.0 / number : brings / sum) : 0.0;
@@ -315,9 +315,27 @@ bool is_resampled(uint kind) {
     return FX_RESAMPLED_LIGHTS && (is_triangle_light(kind) || is_sphere_light(kind) || (!FX_WEIGHED_LIGHTS && is_point_or_spot(kind)));
 }
 
+// How much more often than by their power delta lights are chosen. Lamps and sky are found by BSDF sampling as well, delta lights by
+// light sampling alone. Measured at 8 samples a pixel (`scenes/grass`, sun and sky): weights of 1, 4, 8 and 16 leave a relMSE of .0216, .0135,
+// .0120 and .0112; Crytek Sponza at 4 samples behaves alike. More would starve lamps beside a strong sun.
+const float DELTA_WEIGHT = 8.0;
+
+// What the table counts of a light of value 1 that may be resampled, over pi.
+float table_weight(Light light) {
+    if (is_triangle_light(light.kind) || is_sphere_light(light.kind)) {
+        bool two_sided = FX_TWO_SIDED_LAMPS && (Material_flags(materials, light.material) & MATERIAL_EMITS_BEHIND) != 0u;
+        bool sphere = is_sphere_light(light.kind);
+        float area = sphere ? 4.0 * PI * light.b.x * light.b.x : 0.5 * length(cross(light.b - light.a, light.c - light.a));
+        return two_sided ? 2.0 * area : area;
+    }
+    vec2 sines = sin(0.5 * light.c.xy);
+    return DELTA_WEIGHT * (FX_SPOT && light.kind == LIGHT_SPOT ? 2.0 * dot(sines, sines) : 4.0);
+}
+
 // Chooses anew between the light that `word` chooses by the table, which is within the scene, and others, by what each would bring if
-// nothing were in its way (resampled importance sampling: Talbot, Cline and Egbert 2005). Returns the factor of its radiance. The words
-// of the candidates are evenly spaced, and where all bring the same, `word` has its way: so the choice stays as well stratified as it is.
+// nothing were in its way (resampled importance sampling: Talbot, Cline and Egbert 2005). How bright a lamp is on average, pictures and
+// masks included, decides how often it is a candidate, and not what it weighs then. Returns the factor of its radiance. The words of the
+// candidates are evenly spaced, and where all bring the same, `word` has its way: so the choice stays as well stratified as it is.
 float resample(Receiver r, uint word, inout Light light) {
     const uint SPACING = 0xffffffffu / CANDIDATES + 1u;
     uint count = push.constants.light_count, own = word / SPACING, indices[CANDIDATES];
@@ -328,7 +346,7 @@ float resample(Receiver r, uint word, inout Light light) {
         indices[i] = alias_choose(AliasEntry_load(light_table, alias_slot(count, at)), count, at);
         Light candidate = Light_load(lights, indices[i]);
         bool counts = is_resampled(candidate.kind);
-        weights[i] = counts ? min(unshadowed(candidate, r) / candidate.probability, MAX_ODDS) : 0.0;
+        weights[i] = counts ? min(unshadowed(candidate, r) / max(table_weight(candidate), 1e-30), MAX_ODDS) : 0.0;
         sum += weights[i];
         positive += weights[i] > 0.0 ? 1.0 : 0.0;
         number += counts ? 1.0 : 0.0;

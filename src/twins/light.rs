@@ -5,7 +5,8 @@ use crate::math::srgb::luminance;
 use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
 use crate::shaders::shared::light::{
-    BELOW_ONE, BOOST, CANDIDATES, EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY,
+    BELOW_ONE, BOOST, CANDIDATES, DELTA_WEIGHT, EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE,
+    SHARP_PROBABILITY,
 };
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
@@ -242,7 +243,7 @@ fn spot_share(light: &Light, w: Vec3) -> f32 {
     ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0)
 }
 
-/// What a light that is not infinitely far away brings to a receiver from which it is seen, up to a factor that all have.
+/// What a light of value 1 that is not infinitely far away brings to a receiver from which it is seen, up to a factor that all have.
 fn unshadowed(scene: &Scene, light: &Light, r: &Receiver) -> f32 {
     let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
     let (e1, e2) = (b - a, c - a);
@@ -269,7 +270,7 @@ fn unshadowed(scene: &Scene, light: &Light, r: &Receiver) -> f32 {
         }
         _ => 1.0,
     };
-    let brings = (emits * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2).min(MAX_ODDS);
+    let brings = emits * (cosine + r.odds_beyond_cosine) / d2;
     if cosine > 0.0 || r.lets_light_through { brings } else { 0.0 }
 }
 
@@ -282,7 +283,7 @@ fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
     let before_surfaces = scene.lights.iter().take_while(|light| !light.has_surface());
     for light in before_surfaces.filter(|light| light.is_point_or_spot()) {
         group += light.probability;
-        let brings = unshadowed(scene, light, r);
+        let brings = (unshadowed(scene, light, r) * luminance(light.value)).min(MAX_ODDS);
         sum += brings;
         number += if brings > 0.0 { 1.0 } else { 0.0 };
         let share = match brings > 0.0 {
@@ -314,6 +315,19 @@ fn is_resampled(scene: &Scene, light: &Light) -> bool {
     scene.resampled_lights && !light.is_far() && !(scene.weighed_lights && light.is_point_or_spot())
 }
 
+/// What the table counts of a light of value 1 that may be resampled, over pi.
+fn table_weight(scene: &Scene, light: &Light) -> f32 {
+    let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
+    let area = match light.kind {
+        LIGHT_SPHERE => 4.0 * PI * b.x * b.x,
+        LIGHT_TRIANGLE | LIGHT_MIRRORED => 0.5 * (b - a).cross(c - a).length(),
+        LIGHT_SPOT => return DELTA_WEIGHT * 2.0 * (0.5 * c.truncate()).map(f32::sin).length_squared(),
+        _ => return DELTA_WEIGHT * 4.0,
+    };
+    let two_sided = scene.materials[light.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
+    if two_sided { 2.0 * area } else { area }
+}
+
 /// Chooses anew between a light that the table has chosen and others that it chooses likewise, and returns the factor of its radiance.
 fn resample(scene: &Scene, r: &Receiver, word: u32, light: &mut Light) -> f32 {
     let spacing = u32::MAX / CANDIDATES + 1;
@@ -322,7 +336,7 @@ fn resample(scene: &Scene, r: &Receiver, word: u32, light: &mut Light) -> f32 {
     for i in 0..CANDIDATES {
         let candidate = scene.lights[alias_choose(&scene.light_table, word % spacing + i * spacing).0 as usize];
         let counts = is_resampled(scene, &candidate);
-        let weight = (unshadowed(scene, &candidate, r) / candidate.probability).min(MAX_ODDS);
+        let weight = (unshadowed(scene, &candidate, r) / table_weight(scene, &candidate).max(1e-30)).min(MAX_ODDS);
         candidates.push((candidate, if counts { weight } else { 0.0 }));
         number += if counts { 1.0 } else { 0.0 };
         before += if counts && i < own { 1.0 } else { 0.0 };

@@ -399,6 +399,31 @@ fn many_lamps_are_chosen_by_what_they_bring() {
     }
 }
 
+/// A floor below twelve small lamps, beside a wide sign.
+fn beside_a_sign(sign: &str) -> Loaded {
+    let corner = |i: usize| vec3(-2.5 + 0.45 * i as f32, 2.8, 0.0);
+    let lamps: [[Vec3; 3]; 12] =
+        std::array::from_fn(|i| [corner(i), corner(i) + 0.2 * Vec3::X, corner(i) + 0.2 * Vec3::Z]);
+    let sign = format!(
+        "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.0, 2.0, 5.0]\ntarget = [0.0, 0.0, 2.0]\nfov = 15.0\n\
+         [render]\nmax_depth = 2\n[[material]]\nname = 'lamp'\nemission = 4.0\n[[material]]\nname = 'sign'\n{sign}\n\
+         [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 3.0 }}\n\
+         [[mesh]]\nfile = 'lamps.obj'\nmaterial = 'lamp'\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'sign'\ntransform = {{ translate = [0.0, 1.2, -1.9] }}\n"
+    );
+    Workplace::new().obj("lamps.obj", &lamps).scene(&sign)
+}
+
+/// A lamp counts for what it brings on average, not for the brightest that its picture or its opacity leaves of it.
+#[test]
+fn dim_masks_of_one_lamp_take_no_samples_from_others() {
+    let [masked, dim] = ["emission = 4.0\nopacity = 0.004", "emission = 0.016"].map(beside_a_sign);
+    assert!(masked.resampled_lights && dim.resampled_lights);
+    let [a, b] = [&masked, &dim].map(|scene| mean(scene, Strategy::Light, 256));
+    assert!(a.agrees(&b), "{a:?} {b:?}");
+    assert!(a.error < 1.3 * b.error, "{a:?} {b:?}");
+}
+
 /// Share of samples of a lamp whose light is not what a ray in their direction meets.
 fn other_light(scene: &Loaded) -> f64 {
     let differs = |i: &usize| {

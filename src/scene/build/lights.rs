@@ -13,6 +13,7 @@ use crate::memory;
 use crate::scene::Scene;
 use crate::scene::load::texture;
 use crate::scene::rig::Tree;
+use crate::shaders::shared::light::DELTA_WEIGHT;
 use glam::{Mat4, Vec3, Vec4};
 use std::f64::consts::PI;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
@@ -238,13 +239,8 @@ const MOST_WEIGHED: usize = 32;
 /// triangles each, 1.7.
 const MOST_BY_POWER: usize = 8;
 
-/// How much more often than by their power delta lights are chosen. Lamps and sky are found by BSDF sampling as well, delta lights by
-/// light sampling alone. Measured at 8 samples a pixel (`scenes/grass`, sun and sky): weights of 1, 4, 8 and 16 leave a relMSE of .0216, .0135,
-/// .0120 and .0112; Crytek Sponza at 4 samples behaves alike. More would starve lamps beside a strong sun.
-const DELTA_WEIGHT: f64 = 8.0;
-
 fn weight(light: &Light) -> f64 {
-    if light.is_delta() { DELTA_WEIGHT } else { 1.0 }
+    if light.is_delta() { f64::from(DELTA_WEIGHT) } else { 1.0 }
 }
 
 /// Leaves a sky of one colour to BSDF sampling where suns alone shine beside it. A path that leaves the scene finds such a sky as well as
