@@ -244,8 +244,8 @@ impl Taken<'_> {
         &mut self.outcome.film
     }
 
-    /// Writes what was rendered, filters it, and tells how it went. One that is `alone`, and no frame of many, is written before it
-    /// is filtered, too: the noisy image is there whatever becomes of the filter, which a signal ends. So does one at the end.
+    /// Writes what was rendered, filters it, and tells how it went. Of one that is `alone`, and no frame of many, one file is written
+    /// before it is filtered, too: the noisy image is there whatever becomes of the filter, which a signal ends. So does one at the end.
     ///
     /// # Errors
     /// Of every kind; an output that fails keeps no other from being written.
@@ -253,21 +253,23 @@ impl Taken<'_> {
         let whole = self.is_whole();
         let Self { outcome, noisy, files, checkpoint } = self;
         let Outcome { gpu, film, host, status, plan, notes, .. } = &mut *outcome;
-        let (filter, mut written) = (args.denoise.zip(noisy.take()).filter(|_| whole), Vec::new());
-        if alone || filter.is_none() {
-            written = host.time("write", || Ok(outputs::save(args, film, files, checkpoint.take(), whole)))?;
-        }
-        if let Some((method, noisy)) = filter {
-            let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
-            if alone && interrupt::leave_at_once(&line) {
-                interrupt::leave(&line);
+        if let Some((method, noisy)) = args.denoise.zip(noisy.take()).filter(|_| whole) {
+            if alone {
+                let item = outputs::before_filter(args, film);
+                let save = || Ok(outputs::save(item.as_slice(), film, files, checkpoint.take(), true));
+                let line = outputs::unfiltered(&host.time("write", save)?);
+                let line = files.with_failures(&line);
+                if interrupt::leave_at_once(&line) {
+                    interrupt::leave(&line);
+                }
             }
             let planned = plan.is_some();
             let (times, told) = host.time("denoise", || denoised(gpu, method, noisy, film, planned))?;
             status.times.extend(times);
             *notes = told;
-            written = host.time("write", || Ok(outputs::save(args, film, files, None, true)))?;
         }
+        let save = || Ok(outputs::save(&outputs::items(args, film), film, files, checkpoint.take(), whole));
+        let mut written = host.time("write", save)?;
         fail_on_messages(gpu)?;
         let mut more: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
         more.extend(planned::item(args, plan.as_ref())?);
@@ -403,6 +405,16 @@ mod tests {
         assert_eq!(parse(&["room.toml", "-o", "a.png", "-o", "b.exr"]).output_files().len(), 2);
         assert_eq!(parse(&["room.v2.obj"]).output_files(), [Path::new("room.v2.exr")]);
         assert_eq!(parse(&["room.toml", "--exposure=-1.5"]).png.write_options().exposure, -1.5);
+    }
+
+    #[test]
+    fn one_file_is_written_before_a_filter() {
+        let first = |words: &[&str]| outputs::before_filter(&parse(words), &Film::default()).map(|item| item.path);
+        let outputs = ["-o", "a.png", "-o", "b.exr", "-o", "c.exr", "--heatmap", "map.png"];
+        assert_eq!(first(&[&["room.toml"], &outputs[..]].concat()), Some("b.exr".into()));
+        assert_eq!(first(&["room.toml", "-o", "a.hdr", "-o", "b.png"]), Some("a.hdr".into()));
+        #[cfg(unix)]
+        assert_eq!(first(&["room.toml", "-o", "/dev/null", "--heatmap", "map.png"]), None);
     }
 
     #[test]

@@ -110,10 +110,11 @@ fn a_pipe_gets_the_image_once() {
 fn ctrl_c_is_heard_while_a_filter_runs() {
     let folder = tempfile::tempdir().unwrap();
     let words = format!("render {} --width 768 --height 768 --max-depth 2 --spp 1 --quiet", scene());
-    let mut running = start(&folder, &format!("{words} --denoise auto -o a.exr"));
+    let mut running = start(&folder, &format!("{words} --denoise auto -o a.png -o a.exr --heatmap map.png"));
     running.until_there_is("a.exr");
     running.send(&["INT"]);
-    complains(&running.end(), 130, &["the noisy image was written", "--denoise"]);
+    complains(&running.end(), 130, &["the noisy image was written to a.exr,", "--denoise"]);
+    assert_eq!(names(folder.path()), ["a.exr"], "what the filter makes, or leaves as it is, is written once");
     let noisy = film(&folder, "a.exr");
     assert!(noisy.channel("Noisy Image.R").is_none() && noisy.channel("pending").is_none());
     let mut running = start(&folder, "filter a.exr --filter auto --quiet -o b.exr");

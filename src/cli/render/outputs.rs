@@ -35,10 +35,10 @@ pub fn check(args: &Args) -> Result<()> {
     check_distinct(&all, &[("the scene", &args.scene)])
 }
 
-/// Writes the images that are files, and brings the checkpoint up to date or removes it: where an image has all layers, or
+/// Writes those of the items that are files, and brings the checkpoint up to date or removes it: where an image has all layers, or
 /// the render is complete, it is not needed any more.
 pub fn save(
-    args: &Args,
+    items: &[Item],
     film: &Film,
     files: &mut Files,
     checkpoint: Option<CheckpointFile>,
@@ -48,7 +48,7 @@ pub fn save(
     if broken > 0 {
         complain(&format!("warning: {broken} pixels are not finite"));
     }
-    let mut written = files.save(&items(args, film), whole);
+    let mut written = files.save(items, whole);
     let Some(mut checkpoint) = checkpoint else { return written };
     if !whole && !written.iter().any(|path| image::has_layers(path)) {
         written.extend(checkpoint.write(files, film));
@@ -72,6 +72,22 @@ pub fn save_pictures(args: &Args, film: &Film) -> Result<()> {
     files.failure().map_or(Ok(()), Err)
 }
 
+/// The one image that is written before a filter runs, so that no sample is lost whatever becomes of that: the first file with
+/// all layers, or else the first file. None where all are pipes.
+pub fn before_filter<'a>(args: &Args, film: &'a Film) -> Option<Item<'a>> {
+    let files = args.output_files().into_iter().filter(|path| !output::is_special(path));
+    let path = files.min_by_key(|path| !image::has_layers(path))?;
+    Some(Item::image(path, film, args.png.write_options()))
+}
+
+/// Says what there is when a signal ends the filter.
+pub fn unfiltered(written: &[PathBuf]) -> String {
+    match written.is_empty() {
+        true => "interrupted: --denoise was not finished, and nothing was written".to_owned(),
+        false => format!("interrupted: the noisy image was written to {}, --denoise was not finished", names(written)),
+    }
+}
+
 /// The images: a film's own, and that of its samples.
 pub fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
     let options = args.png.write_options();
@@ -82,11 +98,14 @@ pub fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
 
 /// Says where what there is was written, and how to go on where a device can.
 pub fn interruption(written: &[PathBuf], can_resume: bool) -> String {
-    let names = written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
     let resumable = written.iter().find(|path| can_resume && image::has_layers(path));
     let how = resumable.map(|path| format!("; --resume {} continues it", quoted(&path.display().to_string())));
     let how = how.unwrap_or_default();
-    format!("interrupted: what there is was written to {names}{how}")
+    format!("interrupted: what there is was written to {}{how}", names(written))
+}
+
+fn names(written: &[PathBuf]) -> String {
+    written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// Samples per pixel from 0 (dark) to the largest number (bright).
