@@ -98,6 +98,25 @@ pub(super) fn claim(bytes: &[u8], frame: Frame) -> Result<Claim, String> {
     claim::of_exr(&meta, bytes.len().saturating_sub(stream.position() as usize), frame)
 }
 
+/// What the headers alone tell of [`decode`]'s film of [`Frame::Display`]: its channels have no samples.
+pub(super) fn head(bytes: &[u8]) -> Result<Film, String> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(plain)?;
+    let frame = frame::of(&meta, Frame::Display);
+    let mut film = Film::new(frame.size.0 as u32, frame.size.1 as u32);
+    let many = meta.headers.len() > 1;
+    for header in &meta.headers {
+        let part_name = header.own_attributes.layer_name.as_ref().filter(|_| many).map(string);
+        for channel in &header.channels.list {
+            let name = channel_name(part_name.as_deref(), &string(&channel.name));
+            let window = held(frame::window(header), frame);
+            film.channels.push(Channel { name, samples: Samples::F32(Vec::new()), window });
+        }
+        film.metadata.extend(texts(&header.own_attributes.other));
+    }
+    film.metadata.extend(texts(&meta.headers[0].shared_attributes.other));
+    Ok(film)
+}
+
 /// The rectangles of [`Frame::Data`] and [`Frame::Display`], from the headers alone.
 pub(super) fn frames(bytes: &[u8]) -> Result<[IntegerBounds; 2], String> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(plain)?;

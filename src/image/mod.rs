@@ -107,6 +107,21 @@ pub fn read(path: &Path) -> Result<Film> {
     decode_file(path, &input::read_image(path)?, Frame::Display)
 }
 
+/// Reads the header of an image file: size, metadata and channels, which have no samples. Files that are no EXR have neither metadata
+/// nor channels.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_head(path: &Path) -> Result<Film> {
+    let bytes = input::read_image(path)?;
+    let about = |what| Error::input(path, what);
+    let Claim { size: [width, height], .. } = claim_of(&bytes, Frame::Display).map_err(about)?;
+    match is_exr(&bytes) {
+        true => contained(|| exr::head(&bytes)).map_err(about),
+        false => Ok(Film::new(width, height)),
+    }
+}
+
 /// As [`read`], for a file that is already in memory.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! Renders of the same picture by different samples become one.
 use super::film;
 use super::provenance::{self, Provenance, SampleRange};
-use super::rendered::Rendered;
+use super::rendered::{Head, Rendered};
 use crate::error::{Error, Result};
 use crate::image::{self, Film};
 use crate::render::settings::Settings;
@@ -11,32 +11,36 @@ use std::path::Path;
 /// Settings in which merged renders may differ.
 const FREE: [&str; 3] = ["spp", "first_sample", "seed"];
 
-struct Part {
-    pixels: Vec<Pixel>,
-    broken: Option<BrokenSamples>,
+/// A file to merge, of which only the header was read.
+struct Part<'a> {
+    path: &'a Path,
     splits_light: bool,
-    is_full: bool,
     settings: Settings,
     /// Its settings are all but [`FREE`].
     provenance: Provenance,
 }
 
-impl Part {
-    fn read(path: &Path) -> Result<(Self, Film)> {
-        let film = image::read(path)?;
-        let bytes = film.pixels() as u64 * (size_of::<Pixel>() as u64 + film::bytes_per_pixel(false));
-        image::check_memory(path, bytes)?;
-        let rendered = Rendered::of(&film).map_err(|what| Error::input(path, what))?;
-        Ok((Self::of(rendered), film))
-    }
-
-    fn of(rendered: Rendered) -> Self {
-        let is_full = rendered.is_full();
-        let Rendered { mut provenance, settings: own, pixels, broken, splits_light, .. } = rendered;
+impl<'a> Part<'a> {
+    fn open(path: &'a Path) -> Result<Self> {
+        let head = Head::of(&image::read_head(path)?).map_err(|what| Error::input(path, what))?;
+        let Head { mut provenance, settings: own, splits_light } = head;
         if let Some(settings) = provenance.settings.as_object_mut() {
             settings.retain(|key, _| !FREE.contains(&key.as_str()));
         }
-        Self { pixels, broken, splits_light, is_full, settings: own, provenance }
+        Ok(Self { path, splits_light, settings: own, provenance })
+    }
+
+    /// Reads the samples.
+    fn read(&self) -> Result<(Rendered, Film)> {
+        let about = |what| Error::input(self.path, what);
+        let film = image::read(self.path)?;
+        let bytes = film.pixels() as u64 * (size_of::<Pixel>() as u64 + film::bytes_per_pixel(false));
+        image::check_memory(self.path, bytes)?;
+        let rendered = Rendered::of(&film).map_err(about)?;
+        match rendered.provenance.samples == self.provenance.samples {
+            true => Ok((rendered, film)),
+            false => Err(about("was replaced while it was read: merge again".to_owned())),
+        }
     }
 
     /// By this the parts are sorted: no two that may be merged have the same.
@@ -98,43 +102,59 @@ pub struct Gap {
 /// [`Error::Input`] when a file cannot be read or does not belong to the others, [`Error::Device`] when there is not enough
 /// memory, [`Error::Usage`] when there is no file, or when a pixel would have more samples than it can count.
 pub fn merge<P: AsRef<Path>>(files: &[P]) -> Result<Merged> {
-    let (mut parts, mut film) = (Vec::<Part>::new(), Film::default());
-    for path in files.iter().map(AsRef::as_ref) {
-        let (part, own_film) = Part::read(path)?;
-        if let Some(what) = parts.iter().find_map(|earlier| earlier.conflict(&part)) {
-            return Err(Error::input(path, what));
-        }
-        // What is not joined is the same in all but for rounding: it is taken from the first.
-        if parts.iter().all(|other| part.first() < other.first()) {
-            film = own_film;
-        }
-        parts.push(part);
+    let parts = sorted(files)?;
+    let (first, others) =
+        parts.split_first().ok_or_else(|| Error::Usage("there are no files to merge: name at least one".into()))?;
+    // What is not joined is the same in all but for rounding: it is taken from the first.
+    let (whole, mut film) = first.read()?;
+    let mut ranges = ranges(first, whole.is_full());
+    let Rendered { mut pixels, mut broken, .. } = whole;
+    for part in others {
+        let (rendered, _) = part.read()?;
+        ranges.extend(self::ranges(part, rendered.is_full()));
+        broken = BrokenSamples::join(broken, rendered.broken);
+        pixels.iter_mut().zip(&rendered.pixels).for_each(|(a, b)| *a = join(a, b));
     }
-    parts.sort_by_key(Part::first);
-    if parts.is_empty() {
-        return Err(Error::Usage("there are no files to merge: name at least one".into()));
-    }
-    let samples = closed_up(&parts)?;
-    let broken = parts.iter().map(|part| part.broken).fold(None, BrokenSamples::join);
-    film::replace_pixels(&mut film, &joined(parts));
+    let samples = closed_up(ranges);
+    film::replace_pixels(&mut film, &pixels);
     film::set_broken_samples(&mut film, broken);
     film.channels.retain(|c| c.name != film::PENDING && c.name != film::PRIORITY);
     provenance::set_samples(&mut film, &samples)?;
     Ok(Merged { film, gaps: gaps(&samples) })
 }
 
-/// The samples of all parts, which are sorted. Ranges that follow each other become one where every pixel has all of the
-/// former: only then is its next sample the one behind its last.
-fn closed_up(parts: &[Part]) -> Result<Vec<SampleRange>> {
-    let of_part =
-        |part: &'_ Part| part.provenance.samples.iter().map(|&range| (range, part.is_full)).collect::<Vec<_>>();
-    let mut all: Vec<_> = parts.iter().flat_map(of_part).collect();
-    all.sort();
-    let sum: u64 = all.iter().map(|(range, _)| u64::from(range.count)).sum();
-    if sum > Settings::MAX_SPP.into() {
-        let most = Settings::MAX_SPP;
-        return Err(Error::Usage(format!("together the files have {sum} samples a pixel: merge {most} at most")));
+/// The files by their first samples, if they can be merged.
+fn sorted<P: AsRef<Path>>(files: &[P]) -> Result<Vec<Part<'_>>> {
+    let mut parts = Vec::<Part>::new();
+    for path in files.iter().map(AsRef::as_ref) {
+        let part = Part::open(path)?;
+        if let Some(what) = parts.iter().find_map(|earlier| earlier.conflict(&part)) {
+            return Err(Error::input(path, what));
+        }
+        parts.push(part);
     }
+    check_sum(parts.iter().flat_map(|part| &part.provenance.samples))?;
+    parts.sort_by_key(Part::first);
+    Ok(parts)
+}
+
+fn check_sum<'a>(ranges: impl Iterator<Item = &'a SampleRange>) -> Result<()> {
+    let (sum, most) = (ranges.map(|range| u64::from(range.count)).sum::<u64>(), Settings::MAX_SPP);
+    match sum > most.into() {
+        true => Err(Error::Usage(format!("together the files have {sum} samples a pixel: merge {most} at most"))),
+        false => Ok(()),
+    }
+}
+
+/// The ranges of a part, each with whether every pixel of the part has all samples.
+fn ranges(part: &Part, is_full: bool) -> Vec<(SampleRange, bool)> {
+    part.provenance.samples.iter().map(|&range| (range, is_full)).collect()
+}
+
+/// The samples of all parts, sorted. Ranges that follow each other become one where every pixel has all of the former: only
+/// then is its next sample the one behind its last.
+fn closed_up(mut all: Vec<(SampleRange, bool)>) -> Vec<SampleRange> {
+    all.sort();
     let mut closed: Vec<(SampleRange, bool)> = Vec::new();
     for (range, is_full) in all {
         match closed.last_mut() {
@@ -145,16 +165,7 @@ fn closed_up(parts: &[Part]) -> Result<Vec<SampleRange>> {
             _ => closed.push((range, is_full)),
         }
     }
-    Ok(closed.into_iter().map(|(range, _)| range).collect())
-}
-
-fn joined(parts: Vec<Part>) -> Vec<Pixel> {
-    let mut parts = parts.into_iter().map(|part| part.pixels);
-    let mut pixels = parts.next().unwrap_or_default();
-    for part in parts {
-        pixels.iter_mut().zip(&part).for_each(|(a, b)| *a = join(a, b));
-    }
-    pixels
+    closed.into_iter().map(|(range, _)| range).collect()
 }
 
 /// What is missing between sorted ranges of one seed.
@@ -170,21 +181,18 @@ fn gaps(samples: &[SampleRange]) -> Vec<Gap> {
 mod tests {
     use super::*;
 
-    fn part(ranges: &[(u32, u32, u32)], is_full: bool) -> Part {
-        let samples = ranges.iter().map(|&(seed, first, count)| SampleRange { seed, first, count }).collect();
-        let provenance = Provenance { settings: serde_json::Value::Null, scene: String::new(), samples };
-        Part {
-            pixels: Vec::new(),
-            broken: None,
-            splits_light: true,
-            is_full,
-            settings: Settings::default(),
-            provenance,
-        }
+    type Range = (u32, u32, u32);
+
+    fn ranges(ranges: &[Range]) -> Vec<SampleRange> {
+        ranges.iter().map(|&(seed, first, count)| SampleRange { seed, first, count }).collect()
     }
 
-    fn closed(parts: &[Part]) -> Vec<(u32, u32, u32)> {
-        closed_up(parts).unwrap().iter().map(|r| (r.seed, r.first, r.count)).collect()
+    fn part(of: &[Range], is_full: bool) -> Vec<(SampleRange, bool)> {
+        ranges(of).into_iter().map(|range| (range, is_full)).collect()
+    }
+
+    fn closed(parts: &[Vec<(SampleRange, bool)>]) -> Vec<Range> {
+        closed_up(parts.concat()).iter().map(|r| (r.seed, r.first, r.count)).collect()
     }
 
     #[test]
@@ -198,15 +206,15 @@ mod tests {
 
     #[test]
     fn gaps_within_a_seed_are_found() {
-        let ranges = closed_up(&[part(&[(0, 0, 64), (0, 128, 64), (0, 193, 1), (2, 300, 1)], true)]).unwrap();
+        let ranges = closed_up(part(&[(0, 0, 64), (0, 128, 64), (0, 193, 1), (2, 300, 1)], true));
         assert_eq!(gaps(&ranges), [Gap { seed: 0, first: 64, last: 127 }, Gap { seed: 0, first: 192, last: 192 }]);
     }
 
     #[test]
     fn more_samples_than_a_pixel_can_count_are_refused() {
         let most = Settings::MAX_SPP;
-        assert!(closed_up(&[part(&[(0, 0, most)], true)]).is_ok());
-        let error = closed_up(&[part(&[(0, 0, most)], true), part(&[(1, 0, 1)], true)]).unwrap_err().to_string();
+        assert!(check_sum(ranges(&[(0, 0, most)]).iter()).is_ok());
+        let error = check_sum(ranges(&[(0, 0, most), (1, 0, 1)]).iter()).unwrap_err().to_string();
         assert!(error.contains("16777217 samples a pixel"), "{error}");
     }
 }

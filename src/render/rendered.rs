@@ -8,6 +8,30 @@ use crate::render::settings::{Placing, Settings};
 use crate::statistics::{BrokenSamples, Pixel};
 use serde::Deserialize;
 
+/// What the header of a file says of what was rendered.
+pub(crate) struct Head {
+    /// Where the samples come from.
+    pub provenance: Provenance,
+    /// As those of [`Rendered`].
+    pub settings: Settings,
+    /// Whether direct and indirect light are kept apart.
+    pub splits_light: bool,
+}
+
+impl Head {
+    /// Reads the metadata and the names of the channels; the samples may be missing.
+    ///
+    /// # Errors
+    /// What is missing or damaged.
+    pub(crate) fn of(film: &Film) -> Result<Self, String> {
+        let provenance = Provenance::of(film)?;
+        let settings = Settings::deserialize(&provenance.settings).map_err(|e| format!("settings: {e}"))?;
+        settings.validate().map_err(|e| format!("settings: {e}"))?;
+        check_size(film, &settings)?;
+        Ok(Self { provenance, settings, splits_light: film::splits_light(film)? })
+    }
+}
+
 /// What was rendered so far.
 pub(crate) struct Rendered {
     /// Where the samples come from.
@@ -18,8 +42,6 @@ pub(crate) struct Rendered {
     pub pixels: Vec<Pixel>,
     /// Samples that were no number.
     pub broken: Option<BrokenSamples>,
-    /// Whether direct and indirect light are kept apart.
-    pub splits_light: bool,
     /// Samples that each pixel still lacks: of a file that was interrupted.
     pub pending: Option<Vec<u32>>,
 }
@@ -30,18 +52,15 @@ impl Rendered {
     /// # Errors
     /// What is missing, damaged, or not as the metadata say.
     pub(crate) fn of(film: &Film) -> Result<Self, String> {
-        let provenance = Provenance::of(film)?;
-        let settings = Settings::deserialize(&provenance.settings).map_err(|e| format!("settings: {e}"))?;
-        settings.validate().map_err(|e| format!("settings: {e}"))?;
-        check_size(film, &settings)?;
+        let Head { provenance, settings, .. } = Head::of(film)?;
         let pixels = film::pixels(film)?;
         check_pixels(&pixels, settings.width, provenance.samples_per_pixel())?;
         let pending = film.channel(film::PENDING).map(|_| film::counts(film, film::PENDING)).transpose()?;
         if let Some(pending) = &pending {
             check_pending(pending, &pixels, &settings)?;
         }
-        let (broken, splits_light) = (film::broken_samples(film)?, film::splits_light(film)?);
-        Ok(Self { provenance, settings, pixels, broken, splits_light, pending })
+        let broken = film::broken_samples(film)?;
+        Ok(Self { provenance, settings, pixels, broken, pending })
     }
 
     /// Whether samples are spread evenly, and every pixel has all that the ranges tell of.

@@ -112,6 +112,21 @@ fn neither_believes_what_cannot_be() {
     well(render(&folder, "--spp 4 --resume good.exr -o resumed.exr"));
 }
 
+#[test]
+fn what_cannot_be_merged_is_refused_before_pixels_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    well(render(&folder, "--spp 2 -o a.exr"));
+    let mut bytes = std::fs::read(folder.path().join("a.exr")).unwrap();
+    let behind = bytes.len() - 200;
+    bytes[behind..].fill(0);
+    std::fs::write(folder.path().join("damaged.exr"), bytes).unwrap();
+    complains(&run(&folder, "merge damaged.exr a.exr -o not.exr"), 3, &["a.exr", "count twice"]);
+    // Control: they are read in the end.
+    well(render(&folder, "--spp 2 --first-sample 2 -o b.exr"));
+    complains(&run(&folder, "merge damaged.exr b.exr -o not.exr"), 3, &["damaged.exr", "cannot be decoded"]);
+    assert!(!folder.path().join("not.exr").exists());
+}
+
 /// A file whose data window is a part of its display window: pixels that it does not hold would be black.
 #[test]
 fn a_cut_out_is_no_render() {
