@@ -1,7 +1,8 @@
 //! The film, which is the result of a render and the content of an image file: planes of samples with dotted names, as in
 //! EXR files.
 use super::primaries::{self, Primaries};
-use crate::memory;
+use crate::{memory, threads};
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -142,23 +143,20 @@ impl Film {
         }
     }
 
-    /// Appends the next pixels, row-major, to a film that is filled part by part. The first part determines the channels.
+    /// Appends the next pixels, row-major, to a film that is filled part by part. The first part determines the channels, which are
+    /// filled side by side.
     ///
     /// # Panics
     /// When the channels differ from those of the first part.
-    pub fn append(&mut self, part: Self) {
+    pub fn append(&mut self, parts: &[Self]) {
+        let Some(first) = parts.first() else { return };
         if self.channels.is_empty() {
-            self.channels = part.channels.iter().map(|c| c.empty(self.pixels())).collect();
+            self.channels = first.channels.iter().map(|c| c.empty(self.pixels())).collect();
         }
-        assert_eq!(self.channels.len(), part.channels.len(), "channels of the first part");
-        for (to, from) in self.channels.iter_mut().zip(part.channels) {
-            assert_eq!(to.name, from.name, "channels of the first part");
-            match (&mut to.samples, from.samples) {
-                (Samples::F32(to), Samples::F32(mut from)) => to.append(&mut from),
-                (Samples::U32(to), Samples::U32(mut from)) => to.append(&mut from),
-                _ => panic!("channel {}: samples of another kind", to.name),
-            }
-        }
+        let len = self.channels.len();
+        assert!(parts.iter().all(|part| part.channels.len() == len), "channels of the first part");
+        let fill = |(i, to): (usize, &mut Channel)| parts.iter().for_each(|part| to.append(&part.channels[i]));
+        threads::within_kept(|| self.channels.par_iter_mut().enumerate().for_each(fill));
     }
 
     /// The channel of this exact name.
@@ -270,6 +268,15 @@ impl Channel {
             Samples::U32(_) => Samples::U32(Vec::with_capacity(capacity)),
         };
         Self { name: self.name.clone(), samples, window: None }
+    }
+
+    fn append(&mut self, from: &Self) {
+        assert_eq!(self.name, from.name, "channels of the first part");
+        match (&mut self.samples, &from.samples) {
+            (Samples::F32(to), Samples::F32(from)) => to.extend_from_slice(from),
+            (Samples::U32(to), Samples::U32(from)) => to.extend_from_slice(from),
+            _ => panic!("channel {}: samples of another kind", self.name),
+        }
     }
 }
 

@@ -1,11 +1,15 @@
 //! What a renderer's buffers hold, as the channels of an image file, and back.
 use crate::error::Result;
+use crate::gpu::Buffer;
 use crate::image::{FILTERED, Film, NOISY, Samples};
 use crate::layout::{Guide, PixelLight, PixelStats, vec3};
-use crate::memory;
+use crate::render::buffers::FilmTile;
 use crate::render::settings::Settings;
-use crate::render::{FilmBuffers, Renderer};
+use crate::render::{FilmBuffers, Outputs, Renderer};
 use crate::statistics::{BrokenSamples, Pixel, variance_of_mean};
+use crate::{memory, threads};
+use rayon::prelude::*;
+use std::ops::Range;
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 const XYZ: [&str; 3] = ["X", "Y", "Z"];
@@ -59,24 +63,11 @@ pub fn host_bytes(settings: &Settings, unified: bool) -> u64 {
 pub fn read_back(renderer: &Renderer) -> Result<Film> {
     let (settings, outputs) = (renderer.settings(), renderer.outputs());
     let mut film = Film::new(settings.width, settings.height);
-    // A window at a time: whole buffers beside the film would be as large again.
+    // A batch at a time: whole buffers beside the film would be as large again.
     for tile in &renderer.film().tiles {
-        for range in tile.windows() {
-            let window = range.start as usize..range.end as usize;
-            let mut part = Film::new(window.len() as u32, 1);
-            let stats = tile.stats.read_range(window.clone())?;
-            let guide = if outputs.guides { tile.guide.read_range(window.clone())? } else { Vec::new() };
-            let mut light = if outputs.split_light { tile.light.read_range(window.clone())? } else { Vec::new() };
-            let unsampled = stats.iter().zip(&guide).zip(&mut light).filter(|((stats, _), _)| stats.count == 0);
-            unsampled.for_each(|((_, guide), light)| light.albedo = guide.albedo);
-            add_pixels(&mut part, &stats, &light);
-            if outputs.guides {
-                add_guide(&mut part, &guide);
-            }
-            if tile.has_seen() {
-                add_seen(&mut part, &tile.seen.read_range(window)?);
-            }
-            film.append(part);
+        let pixels = tile.stats.len();
+        for first in (0..pixels).step_by(BATCH) {
+            film.append(&Records::read(tile, first..pixels.min(first + BATCH), outputs)?.films());
         }
     }
     drop_remainders_of_none(&mut film);
@@ -84,6 +75,59 @@ pub fn read_back(renderer: &Renderer) -> Result<Film> {
         film.add(PRIORITY, Samples::F32(renderer.film().counts.priority.read()?));
     }
     Ok(film)
+}
+
+/// Pixels whose records are read at once.
+const BATCH: usize = 1 << 17;
+/// Pixels of which one thread makes channels at once: they fit its cache.
+const RUN: usize = 1 << 12;
+
+/// What buffers hold of a batch of pixels; empty is what is not kept.
+struct Records {
+    stats: Vec<PixelStats>,
+    light: Vec<PixelLight>,
+    guide: Vec<Guide>,
+    seen: Vec<Guide>,
+}
+
+impl Records {
+    fn read(tile: &FilmTile, pixels: Range<usize>, outputs: Outputs) -> Result<Self> {
+        let guide = |kept: bool, buffer: &Buffer<Guide>| match kept {
+            true => buffer.read_range(pixels.clone()),
+            false => Ok(Vec::new()),
+        };
+        Ok(Self {
+            guide: guide(outputs.guides, &tile.guide)?,
+            seen: guide(tile.has_seen(), &tile.seen)?,
+            light: if outputs.split_light { tile.light.read_range(pixels.clone())? } else { Vec::new() },
+            stats: tile.stats.read_range(pixels)?,
+        })
+    }
+
+    /// As films of [`RUN`] pixels each.
+    fn films(&self) -> Vec<Film> {
+        let runs = self.stats.len().div_ceil(RUN);
+        threads::within_kept(|| (0..runs).into_par_iter().map(|run| self.film(run * RUN)).collect())
+    }
+
+    fn film(&self, first: usize) -> Film {
+        fn run<T>(records: &[T], first: usize) -> &[T] {
+            records.get(first..).map_or(&[], |rest| &rest[..rest.len().min(RUN)])
+        }
+        let (stats, guide, seen) = (run(&self.stats, first), run(&self.guide, first), run(&self.seen, first));
+        let mut light = run(&self.light, first).to_vec();
+        let unsampled = stats.iter().zip(guide).zip(&mut light).filter(|((stats, _), _)| stats.count == 0);
+        unsampled.for_each(|((_, guide), light)| light.albedo = guide.albedo);
+        let mut film = Film::new(stats.len() as u32, 1);
+        add_pixels(&mut film, stats, &light);
+        if !guide.is_empty() {
+            add_guide(&mut film, guide);
+        }
+        if !seen.is_empty() {
+            add_seen(&mut film, seen);
+        }
+        film
+    }
 }
 
 /// Adds what the samples say. `light` is empty where direct and indirect light are not kept apart.
