@@ -37,15 +37,20 @@ const EMPTY_TIMES: u64 = 4;
 ///
 /// # Errors
 /// A message about the size that is not possible.
-pub(super) fn of_exr(meta: &MetaData, behind: usize, frame: Frame) -> Result<Claim, String> {
+pub(super) fn of_exr(meta: &MetaData, behind: usize, kind: Frame) -> Result<Claim, String> {
     check_data(&meta.headers, behind as u64)?;
-    let frame = frame::of(meta, frame);
+    let frame = frame::of(meta, kind);
     check_frame(&meta.headers, frame)?;
     let film = 4 * area(frame) * channels(&meta.headers);
     let stored: u64 = meta.headers.iter().map(bytes_of_pixels).fold(0, u64::saturating_add);
-    // Channels are converted one at a time.
-    let plane = if meta.headers.iter().all(|h| is_kept(h, frame)) { 0 } else { 4 * area(frame) };
-    Ok(Claim { size: [frame.size.0 as u32, frame.size.1 as u32], bytes: stored.max(film) + plane })
+    let bytes = match kind {
+        _ if meta.headers.iter().all(|h| is_kept(h, frame)) => stored.max(film),
+        // Channels are converted one at a time.
+        Frame::Display => stored.max(film) + 4 * area(frame),
+        // What was converted stays as it was, to be written again.
+        Frame::Data => stored.saturating_add(film),
+    };
+    Ok(Claim { size: [frame.size.0 as u32, frame.size.1 as u32], bytes })
 }
 
 /// Checks that the claimed pixels and chunks fit into the bytes that follow the headers.

@@ -98,7 +98,7 @@ pub(super) fn claim(bytes: &[u8], frame: Frame) -> Result<Claim, String> {
     claim::of_exr(&meta, bytes.len().saturating_sub(stream.position() as usize), frame)
 }
 
-/// What the headers alone tell of [`decode`]'s film of [`Frame::Display`]: its channels have no samples.
+/// What the headers alone tell of the film of [`Frame::Display`]: its channels have no samples.
 pub(super) fn head(bytes: &[u8]) -> Result<Film, String> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(plain)?;
     let frame = frame::of(&meta, Frame::Display);
@@ -123,14 +123,19 @@ pub(super) fn frames(bytes: &[u8]) -> Result<[IntegerBounds; 2], String> {
     Ok([Frame::Data, Frame::Display].map(|frame| frame::of(&meta, frame)))
 }
 
-/// Decodes a file. It must be called only after [`claim`] has accepted the headers.
-pub(super) fn decode(bytes: &[u8], frame: Frame) -> Result<Film, String> {
-    let image = read(bytes)?;
-    let window = match frame {
-        Frame::Display => image.attributes.display_window,
-        Frame::Data => stored(&image),
-    };
-    film_from(image, window)
+/// The film of [`Frame::Display`]. It must be called only after [`claim`] has accepted the headers.
+pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
+    let mut image = read(bytes)?;
+    let window = image.attributes.display_window;
+    film_from(&mut image, window, false)
+}
+
+/// The film of [`Frame::Data`], and the file without the samples that the film holds as they were stored: [`replace`] takes both. It must
+/// be called only after [`claim`] has accepted the headers.
+pub(super) fn decode_parts(bytes: &[u8]) -> Result<(Film, FlatImage), String> {
+    let mut image = read(bytes)?;
+    let window = stored(&image);
+    Ok((film_from(&mut image, window, true)?, image))
 }
 
 /// New samples for some channels, which are identified by their names in the film of [`Frame::Data`].
@@ -142,9 +147,10 @@ pub(super) struct Replacement<'a> {
     pub(super) entry: (&'a str, &'a str),
 }
 
-/// Encodes the file again with new samples. Everything else is kept except the compression, which becomes lossless.
-pub(super) fn replace(bytes: &[u8], with: &Replacement) -> Result<Vec<u8>, String> {
-    let mut image = read(bytes)?;
+/// Encodes what [`decode_parts`] has made of a file with new samples. Everything else is kept except the compression, which becomes
+/// lossless.
+pub(super) fn replace(parts: &FlatImage, film: &Film, with: &Replacement) -> Result<Vec<u8>, String> {
+    let mut image = whole(parts, film);
     set_entry(&mut image, with.entry);
     let frame = stored(&image);
     let many = image.layer_data.len() > 1;
@@ -169,6 +175,19 @@ pub(super) fn replace(bytes: &[u8], with: &Replacement) -> Result<Vec<u8>, Strin
     let mut out = Cursor::new(Vec::new());
     image.write().to_buffered(SortedHead::new(&mut out)).map_err(|e| format!("cannot be encoded: {e}"))?;
     Ok(out.into_inner())
+}
+
+/// The file with the samples that its film holds.
+fn whole(parts: &FlatImage, film: &Film) -> FlatImage {
+    let mut image = parts.clone();
+    let channels = image.layer_data.iter_mut().flat_map(|part| &mut part.channel_data.list);
+    for (channel, held) in channels.zip(&film.channels).filter(|(channel, _)| channel.sample_data.len() == 0) {
+        channel.sample_data = match &held.samples {
+            Samples::F32(samples) => FlatSamples::F32(samples.clone()),
+            Samples::U32(samples) => FlatSamples::U32(samples.clone()),
+        };
+    }
+    image
 }
 
 /// Sets an attribute for the whole file and removes it from the parts, to which the reader may have assigned it.
@@ -242,19 +261,23 @@ fn check_sampling(meta: &MetaData) -> Result<(), String> {
     }
 }
 
-/// Puts all parts into one film. If there are several, the channel names begin with the name of the part.
-fn film_from(image: FlatImage, frame: IntegerBounds) -> Result<Film, String> {
+/// Puts all parts into one film. If there are several, the channel names begin with the name of the part. Samples that the film
+/// cannot hold as they are stored remain in the image if it `keeps` them.
+fn film_from(image: &mut FlatImage, frame: IntegerBounds, keeps: bool) -> Result<Film, String> {
     let mut film = Film::new(frame.size.0 as u32, frame.size.1 as u32);
     if film.pixels() == 0 {
         return Err("has no pixels: its display window is empty".to_owned());
     }
     let many = image.layer_data.len() > 1;
-    for part in image.layer_data {
+    for part in &mut image.layer_data {
         let part_name = part.attributes.layer_name.as_ref().filter(|_| many).map(string);
-        let data = window(&part);
-        for channel in part.channel_data.list {
+        let data = window(part);
+        for channel in &mut part.channel_data.list {
             let name = channel_name(part_name.as_deref(), &string(&channel.name));
-            let samples = shown_samples(channel.sample_data, data, frame)?;
+            let samples = shown_samples(&mut channel.sample_data, data, frame)?;
+            if !keeps {
+                channel.sample_data = FlatSamples::F32(Vec::new());
+            }
             film.channels.push(Channel { name, samples, window: held(data, frame) });
         }
         film.metadata.extend(texts(&part.attributes.other));
@@ -282,14 +305,16 @@ fn channel_name(part: Option<&str>, channel: &str) -> String {
     }
 }
 
-fn shown_samples(samples: FlatSamples, data: IntegerBounds, frame: IntegerBounds) -> Result<Samples, String> {
+/// The samples are taken where they need no conversion.
+fn shown_samples(samples: &mut FlatSamples, data: IntegerBounds, frame: IntegerBounds) -> Result<Samples, String> {
+    use std::mem::take;
     Ok(match samples {
         FlatSamples::F16(v) => {
             let mut floats = memory::reserved(v.len())?;
             floats.extend(v.iter().map(|h| h.to_f32()));
             Samples::F32(if data == frame { floats } else { shown(&floats, data, frame)? })
         }
-        FlatSamples::F32(v) => Samples::F32(if data == frame { v } else { shown(&v, data, frame)? }),
-        FlatSamples::U32(v) => Samples::U32(if data == frame { v } else { shown(&v, data, frame)? }),
+        FlatSamples::F32(v) => Samples::F32(if data == frame { take(v) } else { shown(v, data, frame)? }),
+        FlatSamples::U32(v) => Samples::U32(if data == frame { take(v) } else { shown(v, data, frame)? }),
     })
 }

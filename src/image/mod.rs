@@ -104,7 +104,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Memory`].
 pub fn read(path: &Path) -> Result<Film> {
-    decode_file(path, &input::read_image(path)?, Frame::Display)
+    decode_file(path, &input::read_image(path)?)
 }
 
 /// Reads the header of an image file: size, metadata and channels, which have no samples. Files that are no EXR have neither metadata
@@ -128,7 +128,7 @@ pub(crate) fn read_head(path: &Path) -> Result<Film> {
 /// One line that says what is wrong with the data, or that they need more memory than is free.
 pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
     memory::check(claim_of(bytes, Frame::Display)?.bytes)?;
-    decode_frame(bytes, Frame::Display)
+    decode_claimed(bytes)
 }
 
 /// Size and memory of an image, by its header.
@@ -152,10 +152,10 @@ pub fn check_room(path: &Path, bytes: &[u8]) -> Result<()> {
     claim_of(bytes, Frame::Display).map_or(Ok(()), |claim| check_memory(path, claim.bytes))
 }
 
-fn decode_file(path: &Path, bytes: &[u8], frame: Frame) -> Result<Film> {
-    let claim = claim_of(bytes, frame).map_err(|what| Error::input(path, what))?;
+fn decode_file(path: &Path, bytes: &[u8]) -> Result<Film> {
+    let claim = claim_of(bytes, Frame::Display).map_err(|what| Error::input(path, what))?;
     check_memory(path, claim.bytes)?;
-    decode_frame(bytes, frame).map_err(|what| Error::input(path, what))
+    decode_claimed(bytes).map_err(|what| Error::input(path, what))
 }
 
 /// Checks that `bytes` of host memory are free.
@@ -171,8 +171,8 @@ fn claim_of(bytes: &[u8], frame: Frame) -> std::result::Result<Claim, String> {
 }
 
 /// Decodes a file. It must be called only after [`claim_of`] has accepted it.
-fn decode_frame(bytes: &[u8], frame: Frame) -> std::result::Result<Film, String> {
-    contained(|| if is_exr(bytes) { exr::decode(bytes, frame) } else { photo::decode(bytes) })
+fn decode_claimed(bytes: &[u8]) -> std::result::Result<Film, String> {
+    contained(|| if is_exr(bytes) { exr::decode(bytes) } else { photo::decode(bytes) })
 }
 
 /// Whether a file with this beginning may be an image.

@@ -3,6 +3,7 @@ use super::film::{Channel, Film, Picture};
 use super::frame::{self, Frame};
 use super::{Claim, exr, primaries};
 use crate::error::{Error, Result};
+use ::exr::image::FlatImage;
 use ::exr::meta::attribute::IntegerBounds;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -31,9 +32,14 @@ impl Unread {
     /// # Errors
     /// As [`super::read`].
     pub fn decode(self) -> Result<Source> {
-        let Self { path, bytes, .. } = self;
-        let film = super::decode_file(&path, &bytes, Frame::Data)?;
-        Ok(Source { path, bytes, film })
+        let Self { path, bytes, claim } = self;
+        super::check_memory(&path, claim.bytes)?;
+        let decoded = match super::is_exr(&bytes) {
+            true => super::contained(|| exr::decode_parts(&bytes)).map(|(film, parts)| (film, Some(parts))),
+            false => super::decode_claimed(&bytes).map(|film| (film, None)),
+        };
+        let (film, parts) = decoded.map_err(|what| Error::input(&path, what))?;
+        Ok(Source { path, bytes, parts, film })
     }
 }
 
@@ -41,6 +47,8 @@ impl Unread {
 pub struct Source {
     path: PathBuf,
     bytes: Vec<u8>,
+    /// What an EXR file holds besides the film.
+    parts: Option<FlatImage>,
     /// Every stored pixel, shown or not, with row 0 at the top.
     pub film: Film,
 }
@@ -89,17 +97,17 @@ impl Source {
     /// [`Error::Input`] when the file holds something that cannot be written again.
     pub fn encoded(&self, channels: &Replaced, keep_as: Option<&str>, entry: (&str, &str)) -> Result<Vec<u8>> {
         let with = exr::Replacement { channels, keep_as, entry };
-        let bytes = match super::is_exr(&self.bytes) {
-            true => super::contained(|| exr::replace(&self.bytes, &with)),
-            false => self.as_exr().and_then(|bytes| exr::replace(&bytes, &with)),
+        let encoded = match &self.parts {
+            Some(parts) => super::contained(|| exr::replace(parts, &self.film, &with)),
+            None => self.as_exr().and_then(|(film, parts)| exr::replace(&parts, &film, &with)),
         };
-        bytes.map_err(|what| Error::input(&self.path, what))
+        encoded.map_err(|what| Error::input(&self.path, what))
     }
 
-    fn as_exr(&self) -> std::result::Result<Vec<u8>, String> {
+    fn as_exr(&self) -> std::result::Result<(Film, FlatImage), String> {
         let mut encoded = Cursor::new(Vec::new());
         exr::encode(&self.film, &mut encoded).map_err(|e| e.to_string())?;
-        Ok(encoded.into_inner())
+        exr::decode_parts(encoded.get_ref())
     }
 
     fn shown_claim(&self) -> Result<Claim> {

@@ -64,6 +64,18 @@ fn only_the_colour_of_a_file_in_many_parts_changes() {
     assert!(matches!(parts[1].channel_data.list[0].sample_data, FlatSamples::F16(_)), "what is kept keeps its type");
 }
 
+/// A file is decoded once: what is written again are the samples of the film.
+#[test]
+fn what_is_written_again_are_the_samples_that_were_decoded() {
+    let folder = tempfile::tempdir().unwrap();
+    let counts = AnyChannel::new("id", FlatSamples::U32(vec![7; 12]));
+    let path = write(&folder, vec![part("main", (0, 0), (4, 3), [triple(["R", "G", "B"], 12), vec![counts]].concat())]);
+    let mut source = Source::read(&path).unwrap();
+    let ids = source.film.channels.iter_mut().find(|c| c.name == "id").unwrap();
+    ids.samples = Samples::U32(vec![8; 12]);
+    assert_eq!(values(&rewritten(&source, &folder).0, "id"), [8.0; 12]);
+}
+
 #[test]
 fn what_was_there_stays_in_a_layer_of_the_same_part() {
     let folder = tempfile::tempdir().unwrap();
