@@ -58,9 +58,11 @@ impl Gpu {
     /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
     /// - Without `robust_buffer_access`, kernels read only what a [`Renderer`](crate::render::Renderer), a
     ///   [`Denoiser`](crate::denoise::Denoiser) and [`filter::run`](crate::denoise::filter::run) give them, which is checked:
-    ///   none of their [`super::Buffer`]s is written by others, no pass, policy or filter is recorded apart from them, and
-    ///   the steps are those of [`Renderer::steps`](crate::render::Renderer::steps) in their order. Otherwise kernels might
-    ///   read and write outside their buffers.
+    ///   none of their [`super::Buffer`]s is written by others, no pass, policy or filter is recorded apart from them,
+    ///   the steps are those of [`Renderer::steps`](crate::render::Renderer::steps) in their order, and
+    ///   [`Renderer::update`](crate::render::Renderer::update) gets a scene as [`Scene::apply`](crate::scene::Scene::apply)
+    ///   has left it, with the change that it returned, or else [`Change::everything`](crate::scene::Change::everything).
+    ///   Otherwise kernels might read and write outside their buffers.
     ///
     /// # Errors
     /// [`Error::Device`] when a handle is null, the device cannot do what is required, or the family cannot compute.

@@ -1,5 +1,5 @@
 //! The buffers of a render: the scene's, the film's, and what is in flight. `P` pixels, `B` paths in flight.
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Buffer, DeviceInfo, Gpu, Location, PART, thread_items};
 use crate::layout::*;
 use crate::render::pass::counts::Counts;
@@ -37,13 +37,29 @@ pub struct DeviceScene {
     pub camera: Buffer<Camera>,
     /// What rays are traced through where that is done by ray queries.
     pub world: Option<World>,
+    parts_that_stay: PartsThatStay,
+}
+
+/// What no pose changes, and how many there are of it.
+type PartsThatStay = [(&'static str, usize); 6];
+
+fn parts_that_stay(scene: &Scene) -> PartsThatStay {
+    let [columns, rows] = scene.environment.as_ref().map_or([0; 2], |sky| [sky.width, sky.height]);
+    [
+        ("triangles", scene.triangles.len()),
+        ("meshes", scene.meshes().len()),
+        ("materials", scene.materials.len()),
+        ("textures", scene.textures.len()),
+        ("columns of texels in its environment", columns as usize),
+        ("rows of texels in its environment", rows as usize),
+    ]
 }
 
 impl DeviceScene {
     /// Copies `scene` to the device, for kernels with these effects.
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`] when it does not fit.
+    /// [`Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, scene: &Scene, effects: &Effects) -> Result<Self> {
         let environment = scene.environment.as_ref();
         let triangles = Buffer::from_texels(gpu, "triangles", &scene.triangles)?;
@@ -68,7 +84,21 @@ impl DeviceScene {
                 environment.map_or(&[], |e| &e.table[..]),
             )?,
             camera: Buffer::from_slice(gpu, "camera", &[Camera::default()])?,
+            parts_that_stay: parts_that_stay(scene),
         })
+    }
+
+    /// Checks that `scene` has as many of all that no pose changes as the one that is here.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the first that differs.
+    pub(super) fn check_parts(&self, scene: &Scene) -> Result<()> {
+        match parts_that_stay(scene).into_iter().zip(self.parts_that_stay).find(|(now, made)| now != made) {
+            Some(((what, now), (_, made))) => Err(Error::Usage(format!(
+                "the scene has {now} {what}, and this renderer was made for {made}: make a new renderer"
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// What the kernels bind.
@@ -270,7 +300,7 @@ impl FilmBuffers {
     /// Room for `pixels` pixels and `paths` paths in flight.
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`] when it does not fit.
+    /// [`Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, pixels: u32, paths: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let records = paths as usize * effects.records_per_path();
         let [capacity, window] = extents(gpu.info());

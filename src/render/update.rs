@@ -15,7 +15,8 @@ impl Renderer {
     /// kept, a [`Step::Reproject`](super::Step::Reproject): samples move with the surfaces that they are of, and stay behind where their light
     /// has changed. That is found by paths traced here and there, two for 16 pixels, of which a change of the camera alone needs none. Of
     /// two updates between frames the second carries nothing: [`Change::add`] makes them one. `scene` is that of [`Renderer::new`] in
-    /// another pose.
+    /// another pose. Textures and the picture of the environment stay on the device as they are: edited ones need a new renderer. Other
+    /// arrays that were edited by hand are brought by [`Change::everything`], which has them checked.
     ///
     /// What is recorded has to be submitted, in this order: later updates bring only what changed since. After a recording that was thrown
     /// away, update with [`Change::everything`].
@@ -25,17 +26,16 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Usage`] with the first effect that the scene calls for now and that was not compiled: make the renderer with it, by
-    /// [`Renderer::specialised`]. Nothing has changed then. [`Error::Usage`] also for a camera that cannot be, and for a scene of its own
-    /// whose hierarchy is deeper, such as one that was loaded in another pose; [`Error::Device`].
+    /// [`Renderer::specialised`]. [`Error::Usage`] also for a camera that cannot be, for a scene of its own whose hierarchy is deeper,
+    /// such as one that was loaded in another pose, and for one with another number of triangles, materials or textures or an
+    /// environment of another size; [`Error::Scene`] where everything has changed, to what [`Scene::check`] refuses; [`Error::Device`].
+    /// But for the last, nothing has changed in the renderer then.
     pub fn update(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
-        self.check_effects(scene, change)?;
-        if scene.stack > self.stack {
-            let (needs, has) = (scene.stack, self.stack);
-            return Err(Error::Usage(format!(
-                "the scene's hierarchy needs a stack of {needs}, and this renderer was made for another scene, with one of {has}: \
-                 make a new renderer, or apply the pose to the scene that it was made for"
-            )));
+        self.check_parts(scene)?;
+        if change.everything {
+            scene.check()?;
         }
+        self.check_effects(scene, change)?;
         let mut constants = frame_constants(scene, &self.settings)?;
         if !change.camera {
             constants.camera = self.frame.constants.camera;
@@ -66,6 +66,18 @@ impl Renderer {
         }
         history.note(&self.gpu, rec, (scene, change), &self.frame.constants.path, self.settings.first_sample)?;
         frame::record_change(rec, &self.frame)
+    }
+
+    /// Whether the scene fits what was compiled and allocated: kernels follow its indices unchecked.
+    fn check_parts(&self, scene: &Scene) -> Result<()> {
+        if scene.stack > self.stack {
+            let (needs, has) = (scene.stack, self.stack);
+            return Err(Error::Usage(format!(
+                "the scene's hierarchy needs a stack of {needs}, and this renderer was made for another scene, with one of {has}: \
+                 make a new renderer, or apply the pose to the scene that it was made for"
+            )));
+        }
+        self.frame.scene.check_parts(scene)
     }
 
     fn check_effects(&self, scene: &Scene, change: &Change) -> Result<()> {

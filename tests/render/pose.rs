@@ -4,9 +4,9 @@ use crate::support::{assert_silent, gpu, render, stats};
 use std::path::Path;
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
-use tallow::layout::{Effects, PixelStats};
+use tallow::layout::{Effects, PixelStats, Texture};
 use tallow::render::{Moves, Outputs, Renderer, Reproject, all_effects};
-use tallow::scene::{Change, EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
+use tallow::scene::{Change, Environment, EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: false, guides: true, counters: false };
 
@@ -161,6 +161,32 @@ fn a_scene_that_needs_a_deeper_stack_is_told_what_to_do() {
     let told = gpu.run(&mut frame, |rec| renderer.update(rec, &other, &Change::everything(&other))).unwrap_err();
     let told = told.to_string();
     assert!(told.contains("make a new renderer, or apply the pose to the scene that it was made for"), "{told}");
+}
+
+#[test]
+fn a_scene_that_a_new_renderer_would_refuse_or_hold_otherwise_is_refused() {
+    let gpu = gpu();
+    let scene = at(&Moment::default());
+    let mut renderer = renderer(&gpu, &scene);
+    let before = render(&gpu, &renderer);
+    type Edit = fn(&mut Scene);
+    let edits: [(&str, Edit); 5] = [
+        ("triangle 0 names material 9999", |s| s.triangles[0].material = 9999),
+        ("triangles, and this renderer", |s| s.triangles.push(s.triangles[0])),
+        ("materials, and this renderer", |s| s.materials.push(s.materials[0])),
+        ("1 textures, and this renderer was made for 0: make a new renderer", |s| s.textures.push(Texture::default())),
+        ("8 columns of texels in its environment", |s| {
+            s.environment = Some(Environment { width: 8, height: 4, ..Environment::default() });
+        }),
+    ];
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    for (part, edit) in edits {
+        let mut edited = scene.scene.clone();
+        edit(&mut edited);
+        let update = gpu.run(&mut frame, |rec| renderer.update(rec, &edited, &Change::everything(&edited)));
+        let told = update.expect_err(part).to_string();
+        assert!(told.contains(part) && render(&gpu, &renderer) == before, "{told}");
+    }
 }
 
 #[test]
