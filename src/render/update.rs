@@ -29,7 +29,8 @@ impl Renderer {
     /// [`Renderer::specialised`]. [`Error::Usage`] also for a camera that cannot be, for a scene of its own whose hierarchy is deeper,
     /// such as one that was loaded in another pose, and for one with another number of triangles, materials or textures or an
     /// environment of another size; [`Error::Scene`] where everything has changed, to what [`Scene::check`] refuses; [`Error::Device`].
-    /// But for the last, nothing has changed in the renderer then.
+    /// But for the last, nothing has changed in the renderer then; the scene keeps its pose. To go back, apply the pose before anew, and
+    /// update with both changes as one.
     pub fn update(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
         self.check_parts(scene)?;
         if change.everything {

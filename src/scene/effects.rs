@@ -102,8 +102,9 @@ pub fn light_and_camera_effects(scene: &Scene) -> Effects {
 }
 
 fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
+    // Those that are dark now are in the rig, and a pose may switch them on.
     let mut light = |effect| {
-        let first = scene.lights.iter().position(|l| l.effect() == Some(effect));
+        let first = scene.lights.iter().chain(&scene.rig.lights).position(|l| l.effect() == Some(effect));
         first.inspect(|&i| reasons.push((effect, light_name(scene, i)))).is_some()
     };
     found.emissive = light(Effect::emissive);
@@ -123,8 +124,14 @@ fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
     found.large_lamps = because(reasons, Effect::large_lamps, panels && scene.large_lamps, name);
 }
 
+/// That of a light of the scene or, with a number beyond those, of the rig.
 fn light_name(scene: &Scene, index: usize) -> String {
-    let light = &scene.lights[index];
+    let Some(light) = scene.lights.get(index) else {
+        return match index - scene.lights.len() {
+            sky if scene.rig.lights[sky].kind == LIGHT_ENVIRONMENT => "environment, which is dark".into(),
+            number => format!("[[light]] {number}, which is dark"),
+        };
+    };
     match scene.names.materials.get(light.material as usize) {
         Some(name) => format!("material \"{name}\""),
         None if light.kind == LIGHT_ENVIRONMENT => "environment".into(),

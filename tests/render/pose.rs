@@ -6,6 +6,7 @@ use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Effects, PixelStats, Texture};
 use tallow::render::{Moves, Outputs, Renderer, Reproject, all_effects};
+use tallow::scene::description::{LightTable, Rgb};
 use tallow::scene::{Change, Environment, EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: false, guides: true, counters: false };
@@ -69,9 +70,38 @@ fn an_effect_that_was_not_compiled_is_named() {
     let mut frame = FrameResources::new(&gpu).unwrap();
     let error = gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change)).unwrap_err();
     assert!(error.to_string().contains("\"alpha_masks\"") && error.exit_code() == 2, "{error}");
+    let solid = MaterialChange { opacity: Some(1.0), ..MaterialChange::default() };
+    let mut back = change.clone();
+    back.add(scene.apply(&Pose { materials: vec![(0, solid)], ..Pose::default() }).unwrap());
+    gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &back)).unwrap();
+    assert!(render(&gpu, &renderer) == fresh(&gpu, &at(&Moment::default())));
+    let change = scene.apply(&Pose { materials: vec![(0, fade)], ..Pose::default() }).unwrap();
     let effects = Effects { alpha_masks: true, ..*renderer.effects() };
     let mut able = Renderer::specialised(&gpu, &scene, &scene.settings, OUTPUTS, effects).unwrap();
     gpu.run(&mut frame, |rec| able.update(rec, &scene, &change)).unwrap();
+}
+
+#[test]
+fn what_is_dark_when_the_renderer_is_made_can_be_switched_on() {
+    let gpu = gpu();
+    let text = DARK.replace("intensity = 4", "intensity = 0");
+    let scene =
+        || Scene::parse(Path::new("scene.toml"), &text).unwrap().with(|s| (s.width, s.height, s.spp) = (24, 16, 2));
+    let lit = Rgb([4.0; 3]);
+    let bulb = LightTable { position: Some([2.0, 3.0, 1.0]), intensity: Some(lit), ..LightTable::default() };
+    let dawn = EnvironmentChange { radiance: Some([1.0; 3]), rotation: None };
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    for pose in
+        [Pose { lights: vec![(0, bulb)], ..Pose::default() }, Pose { environment: Some(dawn), ..Pose::default() }]
+    {
+        let mut scene = scene();
+        let mut renderer = renderer(&gpu, &scene);
+        let dark = render(&gpu, &renderer);
+        let change = scene.apply(&pose).unwrap();
+        gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change)).unwrap();
+        let found = render(&gpu, &renderer);
+        assert!(found != dark && found == fresh(&gpu, &scene), "{pose:?}");
+    }
 }
 
 /// A panel above a cube and a dark sky, neither of which shines yet, and a light without soft shadows.
