@@ -29,7 +29,7 @@ impl Denoiser {
     ///
     /// # Errors
     /// [`Error::Usage`] for settings out of range and for a renderer without what the filter needs, [`Error::Device`] when
-    /// the film is too large for the device's bindings.
+    /// the film is too large for the device's bindings, or `renderer` was made on another device.
     pub fn new(
         gpu: &Gpu,
         renderer: &Renderer,
@@ -38,6 +38,7 @@ impl Denoiser {
         demodulation: Demodulation,
     ) -> Result<Self> {
         settings.validate()?;
+        gpu.owns("the renderer", &renderer.gpu)?;
         let noisy = Noisy::of_film(renderer)?;
         let apart = demodulation == Demodulation::Light;
         if apart && !noisy.holds().light {
@@ -71,7 +72,8 @@ impl Denoiser {
         self.parts.record_join(rec)
     }
 
-    /// Filtered linear radiance (Rec. 709), 4 floats a pixel, the last of them 1.
+    /// Filtered linear radiance (Rec. 709), 4 floats a pixel, the last of them 1. It lies in a buffer of the denoiser's own, which
+    /// the next frame overwrites: see [`RawBuffer`](crate::gpu::RawBuffer).
     pub fn radiance(&self) -> OutputView {
         OutputView {
             buffer: self.parts.picture.raw(),

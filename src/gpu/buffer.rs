@@ -25,7 +25,9 @@ pub enum Location {
     Readback,
 }
 
-/// A range of a Vulkan buffer, for code that binds it itself.
+/// A range of a Vulkan buffer, for code that binds it itself. The buffer was made with `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`,
+/// `UNIFORM_BUFFER`, `UNIFORM_TEXEL_BUFFER`, `TRANSFER_SRC` and `TRANSFER_DST`, and with `VK_SHARING_MODE_EXCLUSIVE`: a queue of
+/// another family than that of the `Gpu` reads it only between two transfers of its ownership, there and back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawBuffer {
     /// The `VkBuffer` handle.

@@ -55,7 +55,12 @@ impl Gpu {
     /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled, and with what [`RawDevice::tracing`] takes.
     /// - Whoever creates or destroys an instance or a device on another thread while this runs, or, with [`RawDevice::debug_utils`], as
     ///   long as the returned `Gpu` is used, holds [`super::change_loader_lists`].
-    /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
+    /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do, or what calls these:
+    ///   [`Renderer::new`](crate::render::Renderer::new), `specialised` and `resumable`, [`Denoiser::new`](crate::denoise::Denoiser::new),
+    ///   [`Filtered`](crate::denoise::Filtered), [`filter::run`](crate::denoise::filter::run), and all that
+    ///   [`Recorder::external`](super::Recorder::external) lists. Recording uses no queue: neither `record`, `update` and `steps_on` of a
+    ///   renderer nor a denoiser's `record`. With a queue of its own, where the family has several, there is nothing to
+    ///   lock; frames may still be submitted to any queue of the family.
     /// - Without `robust_buffer_access`, kernels read only what a [`Renderer`](crate::render::Renderer), a
     ///   [`Denoiser`](crate::denoise::Denoiser) and [`filter::run`](crate::denoise::filter::run) give them, which is checked:
     ///   none of their [`super::Buffer`]s is written by others, no pass, policy or filter is recorded apart from them,
@@ -68,10 +73,7 @@ impl Gpu {
     /// [`Error::Device`] when a handle is null, the device cannot do what is required, or the family cannot compute.
     /// [`Error::Usage`] for a tuning that cannot be.
     pub unsafe fn from_raw(raw: RawDevice) -> Result<Self> {
-        let handles = [raw.instance, raw.physical_device, raw.device, raw.queue];
-        if raw.get_instance_proc_addr.is_null() || handles.contains(&0) {
-            return Err(Error::Device(format!("a null handle was handed over: {raw:?}")));
-        }
+        check_handles(&raw)?;
         // SAFETY: a valid `vkGetInstanceProcAddr` by contract; function pointers have the size of data pointers on
         // every platform that has Vulkan.
         let get_instance_proc_addr =
@@ -114,6 +116,22 @@ impl Gpu {
         let opened =
             Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };
         Self::assemble(opened, raw.cache, raw.wait_limit)
+    }
+}
+
+fn check_handles(raw: &RawDevice) -> Result<()> {
+    let handles = [
+        ("get_instance_proc_addr", raw.get_instance_proc_addr as u64),
+        ("instance", raw.instance),
+        ("physical_device", raw.physical_device),
+        ("device", raw.device),
+        ("queue", raw.queue),
+    ];
+    match handles.iter().find(|(_, handle)| *handle == 0) {
+        Some((field, _)) => {
+            Err(Error::Device(format!("a null handle was handed over: give RawDevice::{field} that of your engine")))
+        }
+        None => Ok(()),
     }
 }
 

@@ -15,7 +15,21 @@ pub struct Feature {
     field: fn(&mut Features) -> &mut vk::Bool32,
 }
 
-/// All features that Tallow requires of a device. A device handed over to [`super::Gpu::from_raw`] must have them enabled.
+/// All features that Tallow requires of a device. A device handed over to [`super::Gpu::from_raw`] must have them enabled, each in its
+/// struct:
+///
+/// ```
+/// let names: Vec<_> = tallow::gpu::REQUIRED_FEATURES.iter().map(|feature| feature.name).collect();
+/// let listed = [
+///     "Vulkan 1.3",        // VkApplicationInfo::apiVersion, and that of the device
+///     "synchronization2",  // VkPhysicalDeviceVulkan13Features
+///     "maintenance4",      // VkPhysicalDeviceVulkan13Features
+///     "scalarBlockLayout", // VkPhysicalDeviceVulkan12Features
+///     "shaderInt64",       // VkPhysicalDeviceFeatures
+///     "hostQueryReset",    // VkPhysicalDeviceVulkan12Features
+/// ];
+/// assert_eq!(names, listed);
+/// ```
 pub const REQUIRED_FEATURES: &[Feature] = &[
     Feature { name: "Vulkan 1.3", field: |f| &mut f.vulkan_1_3 },
     Feature { name: "synchronization2", field: |f| &mut f.v13.synchronization2 },
@@ -275,5 +289,14 @@ fn driver_version(vendor: u32, v: u32) -> String {
     match vendor {
         NVIDIA => format!("{}.{:02}.{:02}", v >> 22, v >> 14 & 0xff, v >> 6 & 0xff),
         _ => version(v),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_guide_names_all_that_is_required() {
+        let guide = include_str!("../guide/embedding.md");
+        assert!(super::REQUIRED_FEATURES.iter().all(|feature| guide.contains(feature.name)));
     }
 }

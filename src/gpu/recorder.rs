@@ -61,11 +61,12 @@ impl<'a> Recorder<'a> {
     /// - `frame` is neither recorded into again nor dropped before that submission is complete.
     /// - No buffer that it uses is read or written from the submission until it is complete: by [`Buffer::read`],
     ///   [`Buffer::read_range`] or [`Buffer::write`], by [`Gpu::run`], by what calls any of these, or by another such submission,
-    ///   unless a semaphore orders the two. What calls them is all that returns what the device has found or gives the device what
-    ///   the host has: of a [`Renderer`](crate::render::Renderer) `picture`, `counters`, `broken_samples`, `apportionment`,
-    ///   `listed`, `priorities_of`, `carriage`, `resume`, `take_up`, `add_history`, `keep_history`, `begin_frame`, `look_up` and
-    ///   `run`, every function of a [`Job`](crate::render::Job), and of a [`Denoiser`](crate::denoise::Denoiser) `scales`. All of
-    ///   these are safe functions, and nothing but this promise keeps them from memory that the device is writing.
+    ///   unless that goes to the same queue or a semaphore orders the two. What calls them is all that returns what the device has
+    ///   found or gives the device what the host has: of a [`Renderer`](crate::render::Renderer) `picture`, `counters`,
+    ///   `broken_samples`, `apportionment`, `listed`, `priorities_of`, `carriage`, `resume`, `take_up`, `add_history`,
+    ///   `keep_history`, `begin_frame`, `look_up` and `run`, every function of a [`Job`](crate::render::Job), and of a
+    ///   [`Denoiser`](crate::denoise::Denoiser) `scales`. All of these are safe functions, and nothing but this promise keeps them
+    ///   from memory that the device is writing.
     /// - The recorder is dropped before the command buffer is ended.
     ///
     /// # Errors

@@ -39,7 +39,7 @@ impl Outputs {
 
 /// A scene on a device and the kernels to render it. Everything is created in [`Renderer::new`], nothing later.
 pub struct Renderer {
-    pub(super) gpu: Gpu,
+    pub(crate) gpu: Gpu,
     pub(super) frame: Frame,
     pub(super) effects: Effects,
     pub(super) outputs: Outputs,

@@ -1,5 +1,5 @@
 //! Results for the caller, where they lie.
-use super::Renderer;
+use super::{Outputs, Renderer};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, PixelFormat, RawBuffer};
 use crate::layout::{Guide, PixelLight, PixelStats};
@@ -47,19 +47,21 @@ pub enum Layer {
 }
 
 impl Renderer {
-    /// Where a layer lies: one view for each of [`super::FilmBuffers::tiles`], in order.
+    /// Where a layer lies: one view for each of [`super::FilmBuffers::tiles`], in order. The buffers are the renderer's own, which the
+    /// next frame overwrites; see [`RawBuffer`] for their usage and who owns them.
     ///
     /// # Errors
     /// [`Error::Usage`] when the renderer was made without the [`super::Outputs`] that keep it.
     pub fn views(&self, layer: Layer) -> Result<Vec<OutputView>> {
-        let kept = match layer {
-            Layer::Radiance | Layer::M2 | Layer::Samples => true,
-            Layer::Direct => self.outputs.split_light,
-            Layer::Albedo => self.outputs.split_light || self.outputs.guides,
-            Layer::Normal | Layer::Position | Layer::Depth | Layer::Object => self.outputs.guides,
+        let Outputs { split_light, guides, .. } = self.outputs;
+        let (kept, output) = match layer {
+            Layer::Radiance | Layer::M2 | Layer::Samples => (true, ""),
+            Layer::Direct => (split_light, "split_light"),
+            Layer::Albedo => (split_light || guides, "guides"),
+            Layer::Normal | Layer::Position | Layer::Depth | Layer::Object => (guides, "guides"),
         };
         if !kept {
-            return Err(Error::Usage(format!("the renderer keeps no {layer:?}: make it with the Outputs that do")));
+            return Err(Error::Usage(format!("the renderer keeps no {layer:?}: make it with Outputs::{output}")));
         }
         Ok(self.frame.film.tiles.iter().map(|tile| view(tile, layer)).collect())
     }

@@ -183,7 +183,10 @@ fn an_engine_gets_every_layer() {
     let one = Scene::load(&scene_file()).map(|scene| scene.with(|s| (s.width, s.height) = (1, 1))).unwrap();
     let plain = Renderer::new(&gpu, &one, &one.settings, Outputs::default()).unwrap();
     assert!(plain.views(Layer::Radiance).is_ok());
-    assert!([Layer::Direct, Layer::Depth].iter().all(|&layer| plain.views(layer).unwrap_err().exit_code() == 2));
+    for (layer, output) in [(Layer::Direct, "Outputs::split_light"), (Layer::Depth, "Outputs::guides")] {
+        let error = plain.views(layer).unwrap_err();
+        assert!(error.to_string().contains(output) && error.exit_code() == 2, "{error}");
+    }
     assert_eq!(engine.messages(), Vec::<String>::new());
 }
 

@@ -290,7 +290,7 @@ fn poses_that_cannot_be_are_one_line_and_change_nothing() {
         (Pose { meshes: vec![twice.clone(), twice], ..Pose::default() }, "mesh 4 is posed twice: keep one"),
         (Pose { materials: vec![(7, Default::default())], ..Pose::default() }, "material 7 of"),
         (Pose { lights: vec![(0, Default::default())], ..Pose::default() }, "light 0: needs intensity"),
-        (Pose { lights: vec![(1, Default::default())], ..Pose::default() }, "light 1"),
+        (Pose { lights: vec![(1, Default::default())], ..Pose::default() }, "light 1 of 1: there is none"),
     ];
     for (pose, line) in cases {
         let error = scene.apply(&pose).unwrap_err();

@@ -355,7 +355,7 @@ fn expected_errors_solve_the_worked_example() {
 
 #[test]
 fn a_frame_without_what_the_filter_needs_is_refused() {
-    let gpu = gpu();
+    let (gpu, other) = (gpu(), gpu());
     let refused = |outputs, policy, demodulation| {
         let renderer = renderer(&gpu, [8, 8], outputs, policy);
         let settings = FilterSettings::default();
@@ -380,6 +380,9 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
             .map(|e| e.to_string()),
         "extent",
     );
+    let right = FilterSettings::default();
+    let foreign = Denoiser::new(&other, &renderer, find("atrous").unwrap(), &right, Demodulation::Light);
+    has(foreign.err().map(|e| e.to_string()), "the renderer was made on another device");
     assert_silent(&gpu);
 }
 

@@ -233,8 +233,9 @@ fn next_lights(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Light>>> {
     let sky = lights.iter().position(|light| light.kind == LIGHT_ENVIRONMENT);
     let count = sky.unwrap_or(lights.len());
     for (index, table) in &pose.lights {
-        let built = table.build().map_err(|what| format!("light {index}: {what}"))?;
-        *lights[..count].get_mut(*index).ok_or_else(|| format!("light {index} of {count}: there is none"))? = built;
+        let light = lights[..count].get_mut(*index);
+        let light = light.ok_or_else(|| format!("light {index} of {count}: there is none"))?;
+        *light = table.build().map_err(|what| format!("light {index}: {what}"))?;
     }
     if let Some(to) = &pose.environment {
         let sky = sky.ok_or("the scene has no environment that could change")?;
