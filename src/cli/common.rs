@@ -1,6 +1,6 @@
 //! Options shared by commands that run on a device or write pictures.
 use super::{complain, finite, print, print_json};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{self, DeviceOptions, Gpu, Tracing};
 use crate::image::{WriteOptions, tone::ToneMap};
 use crate::settings::entry::Entry;
@@ -96,13 +96,17 @@ impl PngOptions {
     }
 }
 
-/// Checks a number of frames per second.
+/// Parses frames per second, a number or a fraction.
 ///
 /// # Errors
-/// [`Error::Usage`].
-pub fn check_fps(fps: f64) -> Result<()> {
+/// A sentence with what is expected.
+pub fn frames_per_second(text: &str) -> std::result::Result<f64, String> {
+    let fps = match text.split_once('/') {
+        Some((frames, seconds)) => finite(frames)? / finite(seconds)?,
+        None => finite(text)?,
+    };
     match fps > 0.0 && fps <= 1e6 {
-        true => Ok(()),
-        false => Err(Error::Usage(format!("--fps {fps}: choose a number above 0"))),
+        true => Ok(fps),
+        false => Err("choose a number above 0, at most 1000000".to_owned()),
     }
 }

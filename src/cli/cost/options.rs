@@ -1,9 +1,9 @@
 //! Options of `tallow cost`.
 use crate::allocate::{AllocateOverrides as Allocate, Policy};
-use crate::cli::common::{Common, with_ranges};
+use crate::cli::common::{Common, frames_per_second, with_ranges};
 use crate::cli::filter::options as filter;
 use crate::cli::overrides::Overrides;
-use crate::cli::{finite, within};
+use crate::cli::within;
 use crate::cost::grid::Axes;
 use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
@@ -68,8 +68,8 @@ pub struct Args {
     /// rendered before it [default: 8]
     #[arg(long, value_name = "N", conflicts_with = "filter_only", value_parser = clap::value_parser!(u32).range(1..))]
     pub frame: Option<u32>,
-    /// Where the scene moves: frames per second
-    #[arg(long, default_value = "24", value_parser = finite)]
+    /// Where the scene moves: frames per second, such as 24 or 30000/1001
+    #[arg(long, default_value = "24", value_parser = frames_per_second)]
     pub fps: f64,
     /// Options of tallow render or tallow sequence and settings of tallow filter for all points, and of the render for the reference
     /// too, such as "--max-depth 4"; with --filter-only of tallow filter alone

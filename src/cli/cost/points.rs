@@ -1,7 +1,6 @@
 //! The points that `tallow cost` measures: the scene, how it moves, the settings of each point, and the command that renders it.
 use super::options::Words;
 use super::{Args, knobs};
-use crate::cli::common::check_fps;
 use crate::cli::quoted;
 use crate::cost::grid::{self, Candidate};
 use crate::cost::{JudgedFrame, Motion};
@@ -33,7 +32,6 @@ impl Points {
     /// # Errors
     /// Of scene and options.
     pub fn new(args: &Args, path: &Path, gpu: &Gpu) -> Result<(Scene, Self)> {
-        check_fps(args.fps)?;
         let mut file = SceneFile::open(path)?;
         file.stays_still();
         let (mut base, mut filters, mut carries) = (file.settings()?, FilterSettings::default(), Reproject::default());

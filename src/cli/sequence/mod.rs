@@ -5,7 +5,7 @@ mod range;
 mod stage;
 mod survey;
 
-use super::common::{check_fps, with_ranges};
+use super::common::{frames_per_second, with_ranges};
 use super::files::scene_name;
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
@@ -17,7 +17,7 @@ use preview::Preview;
 use serde::Serialize;
 use stage::Stage;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -31,7 +31,9 @@ use std::time::{Duration, Instant};
 /// With --reproject forward a frame begins with samples of the one before, and so depends on all before it. The first frame that is
 /// asked for, and one after a frame that failed, begins anew: --only 40..48 is the same sequence begun at frame 40. A run that goes
 /// on takes up the .exr file of the last finished frame, to the same bits: its layers carried.samples and carried.age say how many
-/// samples of a pixel are of earlier frames, and through how many they came on average.
+/// samples of a pixel are of earlier frames, and through how many they came on average. Parts of a sequence that several machines
+/// render differ at their seams for that: render some frames before each part and throw them away (--only 32..48 for 40..48), or use
+/// --reproject off. A command over the folder in which parts were put together renders anew what was begun elsewhere.
 #[derive(clap::Args)]
 #[command(
     mut_args(with_ranges(Reproject::default().entries())),
@@ -46,8 +48,8 @@ pub struct Args {
     /// Of them, render only these; what they show stays the same
     #[arg(long, value_name = "FIRST..END", value_parser = range::parse, allow_hyphen_values = true)]
     pub only: Option<Range<u32>>,
-    /// Frames per second
-    #[arg(long, default_value = "24", value_parser = finite)]
+    /// Frames per second, such as 24 or 30000/1001
+    #[arg(long, default_value = "24", value_parser = frames_per_second)]
     pub fps: f64,
     /// Give each frame random numbers of its own (the seed plus its number), for those who average over frames. With one seed for
     /// all, noise stands still where nothing moves
@@ -56,7 +58,7 @@ pub struct Args {
     /// Turn the camera about what it looks at, by so many degrees over all of --frames, from the first one
     #[arg(long, value_name = "DEGREES", value_parser = finite)]
     pub turntable: Option<f64>,
-    /// Write a small animated .gif of all frames
+    /// Write a small animated .gif of all frames; it leaves some out above 50 frames per second, more than viewers show
     #[arg(long, value_name = "FILE")]
     pub preview: Option<PathBuf>,
     /// Render finished frames again
@@ -96,13 +98,14 @@ impl Args {
             let text = file.to_str().ok_or_else(|| {
                 Error::Usage(format!("{}: is not UTF-8: choose another name, as by -o NAME.####.exr", file.display()))
             })?;
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            if name.split(|c| c != '#').filter(|run| !run.is_empty()).count() > 1 {
+                let what = "has two places for the number of the frame: keep one run of #";
+                return Err(Error::Usage(format!("{text}: {what}")));
+            }
             let name = numbered(text, number).ok_or_else(|| {
-                let stem = file.with_extension("");
-                let example = format!("{}.####.{}", stem.display(), file.extension().unwrap_or_default().display());
-                Error::Usage(format!(
-                    "{}: every frame would be written there: choose a name as {example}",
-                    file.display()
-                ))
+                let example = with_place(text);
+                Error::Usage(format!("{text}: every frame would be written there: choose a name as {example}"))
             })?;
             *file = name.into();
         }
@@ -129,7 +132,6 @@ impl Args {
                 "--{option} is for one image: a sequence goes on where it stopped by itself"
             )));
         }
-        check_fps(self.fps)?;
         let first = match &self.frames {
             Some(frames) => self.numbers(frames)?.start,
             None => 0,
@@ -137,6 +139,20 @@ impl Args {
         self.preview.iter().try_for_each(|path| preview::check(path))?;
         outputs::check(&self.of_frame(first)?)
     }
+}
+
+/// A name like this one with a place for the number of the frame: that of a `%04d`, or before the extension.
+fn with_place(name: &str) -> String {
+    let printf = name.rsplit_once('%').and_then(|(stem, rest)| {
+        let (digits, rest) = rest.split_once('d')?;
+        let digits = if digits.is_empty() { 4 } else { digits.parse::<u8>().ok()? };
+        Some((stem, usize::from(digits.clamp(1, 9)), rest))
+    });
+    if let Some((stem, digits, rest)) = printf {
+        return format!("{stem}{}{rest}", "#".repeat(digits));
+    }
+    let file = Path::new(name);
+    format!("{}.####.{}", file.with_extension("").display(), file.extension().unwrap_or_default().display())
 }
 
 /// What became of a frame.

@@ -37,7 +37,7 @@ impl Preview {
         Ok(())
     }
 
-    /// Writes what there is, at so many frames per second; viewers show no more than 50.
+    /// Writes what there is, at so many frames per second. Viewers show no more than 50: others are left out.
     ///
     /// # Errors
     /// [`Error::Output`].
@@ -52,10 +52,18 @@ impl Preview {
         encoder.set_repeat(Repeat::Infinite)?;
         // A file counts in hundredths of a second, so that some frames are shown for longer than others.
         let hundredths = |frame: usize| (100.0 * frame as f64 / fps).round();
-        self.0.iter().enumerate().try_for_each(|(n, small)| {
-            let shown = (hundredths(n + 1) - hundredths(n)).clamp(2.0, 60_000.0);
-            let delay = Delay::from_numer_denom_ms(10 * shown as u32, 1);
-            encoder.encode_frame(Frame::from_parts(small.clone(), 0, 0, delay))
+        let mut shown: Vec<usize> = Vec::new();
+        let end = hundredths(self.0.len());
+        for (frame, at) in (0..self.0.len()).map(|frame| (frame, hundredths(frame))) {
+            if shown.last().is_none_or(|&last| (at - hundredths(last)).min(end - at) >= 2.0) {
+                shown.push(frame);
+            }
+        }
+        let ends = shown.iter().skip(1).copied().chain([self.0.len()]);
+        shown.iter().zip(ends).try_for_each(|(&frame, end)| {
+            let time = (hundredths(end) - hundredths(frame)).clamp(2.0, 60_000.0);
+            let delay = Delay::from_numer_denom_ms(10 * time as u32, 1);
+            encoder.encode_frame(Frame::from_parts(self.0[frame].clone(), 0, 0, delay))
         })
     }
 }
@@ -81,6 +89,10 @@ mod tests {
             assert_eq!(shown.iter().sum::<u32>(), 1000, "{fps}: {shown:?}");
             assert!(shown.iter().all(|ms| ms.abs_diff(1000 / fps) <= 10), "{fps}: {shown:?}");
         }
-        assert_eq!((delays(2, 60.0), delays(1, 1e-9)), (vec![20; 2], vec![600_000]));
+        for fps in [50, 60, 100, 120, 1000] {
+            let shown = delays(fps, fps.into());
+            assert!(shown.iter().sum::<u32>() == 1000 && shown.iter().all(|&ms| ms >= 20), "{fps}: {shown:?}");
+        }
+        assert_eq!((delays(1, 1000.0), delays(1, 1e-9)), (vec![20], vec![600_000]));
     }
 }

@@ -220,7 +220,7 @@ fn frames(path: &Path, table: &AnimationTable, from: &Description, mesh: usize) 
         return Err("has keys and files: choose".to_owned());
     }
     if !(fps > 0.0 && fps <= 1e6) {
-        return Err(format!("fps is {fps}: choose a number above 0"));
+        return Err(format!("fps is {fps}: choose a number above 0, at most 1000000"));
     }
     if table.last < table.first || numbered(&pattern.to_string_lossy(), 0).is_none() {
         let [first, last] = [table.first, table.last];
