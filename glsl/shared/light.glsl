@@ -188,7 +188,7 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     vec2 stored = light.kind == LIGHT_MIRRORED ? bary.yx : bary;
     if (FX_TEXTURES) {
         uint image = Material_emission_texture(materials, light.material);
-        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(image, light.triangle, stored), true).rgb;
+        if (image != NONE) radiance *= texture_sample(image, uv_of(texture_coordinates(light.triangle, stored), image), true).rgb;
     }
     if (FX_VERTEX_COLORS && (Material_flags(materials, light.material) & MATERIAL_UNLIT) != 0u)
         radiance *= vertex_color(Shading_load(shading, light.triangle), stored).rgb;

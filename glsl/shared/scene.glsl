@@ -31,10 +31,17 @@ uint material_of(uint triangle, uint instance) {
 #include "shared/sphere.glsl"
 #include "shared/attributes.glsl"
 
-// Coordinates at which a point of a triangle reads the picture `image`.
-vec2 texture_coordinates(uint image, uint triangle, vec2 barycentric) {
-    if (FX_SPHERES && is_sphere(triangle)) return sphere_coordinates(sphere_of(triangle), octahedral_vector(barycentric));
+// Coordinates at which a point of a triangle reads pictures: the first set, and the second one, which is the first where there is none.
+vec4 texture_coordinates(uint triangle, vec2 barycentric) {
+    if (FX_SPHERES && is_sphere(triangle)) return sphere_coordinates(sphere_of(triangle), octahedral_vector(barycentric)).xyxy;
     Shading s = Shading_load(shading, triangle);
-    if (FX_SECOND_UV && (Texture_flags(textures, image) & TEXTURE_SECOND_UV) != 0u) take_second_coordinates(s);
-    return s.uv0 + barycentric.x * (s.uv1 - s.uv0) + barycentric.y * (s.uv2 - s.uv0);
+    vec2 first = s.uv0 + barycentric.x * (s.uv1 - s.uv0) + barycentric.y * (s.uv2 - s.uv0);
+    if (!FX_SECOND_UV) return first.xyxy;
+    take_second_coordinates(s);
+    return vec4(first, s.uv0 + barycentric.x * (s.uv1 - s.uv0) + barycentric.y * (s.uv2 - s.uv0));
+}
+
+// Those of the picture `image`.
+vec2 uv_of(vec4 coordinates, uint image) {
+    return FX_SECOND_UV && (Texture_flags(textures, image) & TEXTURE_SECOND_UV) != 0u ? coordinates.zw : coordinates.xy;
 }

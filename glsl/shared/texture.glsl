@@ -49,10 +49,15 @@ vec4 texture_sample(uint index, vec2 uv, bool colour) {
     if (FX_TEXTURE_MODES && (image.flags & TEXTURE_NEAREST) != 0u) at = floor(at + 0.5);
     ivec2 corner = ivec2(floor(at));
     vec2 f = at - vec2(corner);
-    vec4 top = mix(texture_texel(image, corner, colour), texture_texel(image, corner + ivec2(1, 0), colour), f.x);
-    vec4 low = mix(texture_texel(image, corner + ivec2(0, 1), colour),
-                   texture_texel(image, corner + ivec2(1, 1), colour), f.x);
-    return mix(top, low, f.y);
+    // A loop, which drivers unroll: kernels would hold four times as much for each picture that they look up.
+    vec4 a = vec4(0.0), b = a, c = a, d = a;
+    for (int i = 0; i < 4; i++) {
+        a = b;
+        b = c;
+        c = d;
+        d = texture_texel(image, corner + ivec2(i & 1, i >> 1), colour);
+    }
+    return mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
 }
 
 // Opacity of a surface at a point of a triangle: the share of rays that it stops.
@@ -60,7 +65,7 @@ float surface_opacity(uint material, uint triangle, vec2 barycentric) {
     if ((Material_flags(materials, material) & MATERIAL_MASKED) == 0u) return 1.0;
     float opacity = Material_opacity(materials, material);
     uint image = Material_opacity_texture(materials, material);
-    if (image != NONE) opacity *= texture_sample(image, texture_coordinates(image, triangle, barycentric), false).r;
+    if (image != NONE) opacity *= texture_sample(image, uv_of(texture_coordinates(triangle, barycentric), image), false).r;
     if (FX_VERTEX_COLORS) opacity *= vertex_color(Shading_load(shading, triangle), barycentric).a;
     if (FX_CUTOFF) {
         float cutoff = Material_alpha_cutoff(materials, material);
@@ -69,10 +74,10 @@ float surface_opacity(uint material, uint triangle, vec2 barycentric) {
     return opacity;
 }
 
-// What a picture makes of `constant` at a point of a triangle.
-vec3 textured_at(vec3 constant, uint image, uint triangle, vec2 barycentric, bool color) {
+// What a picture makes of `constant` at a point with these `coordinates`.
+vec3 textured_at(vec3 constant, uint image, vec4 coordinates, bool color) {
     if (!FX_TEXTURES || image == NONE) return constant;
-    return constant * texture_sample(image, texture_coordinates(image, triangle, barycentric), color).rgb;
+    return constant * texture_sample(image, uv_of(coordinates, image), color).rgb;
 }
 
 // Share of light that a smooth wall lets straight through, as metallic_sample does: nothing else brings the light of a source
@@ -89,12 +94,13 @@ vec3 clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycen
     }
     float c = along * inversesqrt(max(dot(n, n) * dot(direction, direction), 1e-37));
     float grazing = 1.0 - min(c, 1.0), squared = grazing * grazing;
-    vec3 base = textured_at(m.base_color, m.base_texture, triangle, barycentric, true);
+    vec4 at = FX_TEXTURES ? texture_coordinates(triangle, barycentric) : vec4(0.0);
+    vec3 base = textured_at(m.base_color, m.base_texture, at, true);
     if (FX_VERTEX_COLORS) base *= vertex_color(Shading_load(shading, triangle), barycentric).rgb;
-    float metallic = textured_at(vec3(m.metallic), m.roughness_texture, triangle, barycentric, false).b;
-    float through = textured_at(vec3(m.transmission_factor), m.transmission_texture, triangle, barycentric, false).r;
-    float f90 = textured_at(vec3(m.specular_factor), m.specular_factor_texture, triangle, barycentric, false).r;
-    vec3 specular = textured_at(m.specular, m.specular_texture, triangle, barycentric, true);
+    float metallic = textured_at(vec3(m.metallic), m.roughness_texture, at, false).b;
+    float through = textured_at(vec3(m.transmission_factor), m.transmission_texture, at, false).r;
+    float f90 = textured_at(vec3(m.specular_factor), m.specular_factor_texture, at, false).r;
+    vec3 specular = textured_at(m.specular, m.specular_texture, at, true);
     float f0 = min(largest_channel(specular), 1.0) * f90;
     return base * (through * (1.0 - metallic) * (1.0 - mix(f0, f90, squared * squared * grazing)));
 }

@@ -111,19 +111,20 @@ bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool l
     float chord = sqrt(max(squared, 0.0)); // half its length
     bool enters = !leaves && -along - chord > 0.0;
     normal = octahedral_point(nearest + (enters ? -chord : chord) * d);
+    bool passes = false;
     if (FX_ALPHA_MASKS) {
-        if (enters && squared >= 0.0 && (-chord - along) * inverse < t_max &&
-            !mask_blocks(index, instance, normal, r.direction, mask_seed)) {
-            enters = false;
-            normal = octahedral_point(nearest + chord * d);
-        }
-        float far = (chord - along) * inverse;
-        bool passes = !enters && squared >= 0.0 && far > 0.0 && far < t_max &&
-                      !mask_blocks(index, instance, normal, r.direction, mask_seed ^ mask_bits(~0u));
-        if (passes) return false;
+        bool near;
+        do {
+            near = enters;
+            float at = ((near ? -chord : chord) - along) * inverse;
+            uint seed = near ? mask_seed : mask_seed ^ mask_bits(~0u);
+            passes = squared >= 0.0 && (near || at > 0.0) && at < t_max && !mask_blocks(index, instance, normal, r.direction, seed);
+            enters = near && !passes;
+            if (near && passes) normal = octahedral_point(nearest + chord * d);
+        } while (near && passes);
     }
     t = ((enters ? -chord : chord) - along) * inverse;
-    return squared >= 0.0 && t > 0.0 && t < t_max;
+    return squared >= 0.0 && !passes && t > 0.0 && t < t_max;
 }
 
 // Near and far distances round at 2^-24 in four steps each; boxes that share a face must not leave a gap (Ize 2013).
