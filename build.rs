@@ -1,7 +1,8 @@
 //! Every `.comp` file below `glsl/` becomes SPIR-V and `$OUT_DIR/shaders.rs`: one module per kernel, with a typed field per binding and per
 //! specialisation constant, so that a forgotten buffer or a constant that a kernel does not have does not compile.
 //! `glsl/test/*.comp`, and kernels that tests run by themselves, become `$OUT_DIR/test_shaders.rs`. Any error stops the build with
-//! file and line. The compiler is `glslc`, as a program: Debian 12's libshaderc cannot be linked (undefined symbols).
+//! file and line. `src/spirv/compact.rs` numbers their ids without gaps. The compiler is `glslc`, as a program: Debian 12's
+//! libshaderc cannot be linked (undefined symbols).
 //! A packaged crate needs no compiler: it carries what `tools/package` compiled, in `spirv/`, under names that tell of which
 //! sources it was made. A checkout has no such folder.
 //!
@@ -33,6 +34,10 @@ use xxhash_rust::xxh3::{Xxh3Default, xxh3_64};
 #[allow(dead_code, unused_imports)]
 #[path = "src/layout/mod.rs"]
 mod layout;
+
+#[allow(dead_code, unused_imports)]
+#[path = "src/spirv/mod.rs"]
+mod spirv;
 
 #[path = "tools/build/emit.rs"]
 mod emit;
@@ -69,6 +74,7 @@ fn main() {
 fn build() -> Result<()> {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=src/layout");
+    println!("cargo:rerun-if-changed=src/spirv");
     println!("cargo:rerun-if-changed=tools/build");
     println!("cargo:rerun-if-changed=glsl");
     if Path::new(PACKAGED).exists() {
@@ -169,7 +175,10 @@ impl Code<'_> {
             fs::write(&partial, compile(self.file, &self.whole)?)?;
             fs::rename(&partial, &from)?;
         }
-        fs::copy(&from, &self.binary)?;
+        let words: Vec<u32> = fs::read(&from)?.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+        // What another version of the compiler writes may be beyond it: such a kernel only takes longer to load.
+        let dense = spirv::compact::compact(&words).unwrap_or(words);
+        fs::write(&self.binary, bytemuck::cast_slice(&dense))?;
         Ok(())
     }
 }

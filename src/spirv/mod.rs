@@ -1,4 +1,5 @@
-//! SPIR-V, the code of kernels as drivers take it: read, computed with, and specialised.
+//! SPIR-V, the code of kernels as drivers take it: read, computed with, specialised and numbered afresh.
+pub mod compact;
 mod evaluate;
 mod flow;
 mod instruction;

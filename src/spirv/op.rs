@@ -1,7 +1,10 @@
 //! Opcodes of SPIR-V by their names in its specification, those that something here asks for.
 pub const UNDEF: u16 = 1;
 pub const NAME: u16 = 5;
+pub const EXTENSION: u16 = 10;
+pub const EXT_INST_IMPORT: u16 = 11;
 pub const EXT_INST: u16 = 12;
+pub const MEMORY_MODEL: u16 = 14;
 pub const ENTRY_POINT: u16 = 15;
 pub const CAPABILITY: u16 = 17;
 /// The first and the last of those that declare types.
@@ -9,23 +12,44 @@ pub const TYPE_VOID: u16 = 19;
 pub const TYPE_FUNCTION: u16 = 33;
 pub const TYPE_BOOL: u16 = 20;
 pub const TYPE_INT: u16 = 21;
+pub const TYPE_FLOAT: u16 = 22;
 pub const TYPE_VECTOR: u16 = 23;
 pub const TYPE_MATRIX: u16 = 24;
-pub const TYPE_RAY_QUERY: u16 = 4472;
-pub const TYPE_ACCELERATION_STRUCTURE: u16 = 5341;
+pub const TYPE_IMAGE: u16 = 25;
+pub const TYPE_ARRAY: u16 = 28;
+pub const TYPE_STRUCT: u16 = 30;
+pub const TYPE_POINTER: u16 = 32;
 pub const CONSTANT_TRUE: u16 = 41;
 pub const CONSTANT_FALSE: u16 = 42;
 pub const CONSTANT: u16 = 43;
+pub const CONSTANT_COMPOSITE: u16 = 44;
 pub const SPEC_CONSTANT_TRUE: u16 = 48;
 pub const SPEC_CONSTANT_FALSE: u16 = 49;
 pub const SPEC_CONSTANT: u16 = 50;
 pub const SPEC_CONSTANT_OP: u16 = 52;
 pub const FUNCTION: u16 = 54;
-#[cfg(test)]
 pub const FUNCTION_END: u16 = 56;
 pub const VARIABLE: u16 = 59;
 pub const LOAD: u16 = 61;
+pub const STORE: u16 = 62;
+pub const ACCESS_CHAIN: u16 = 65;
 pub const DECORATE: u16 = 71;
+pub const MEMBER_DECORATE: u16 = 72;
+pub const VECTOR_SHUFFLE: u16 = 79;
+pub const COMPOSITE_CONSTRUCT: u16 = 80;
+pub const COMPOSITE_EXTRACT: u16 = 81;
+pub const COMPOSITE_INSERT: u16 = 82;
+pub const TRANSPOSE: u16 = 84;
+pub const IMAGE_FETCH: u16 = 95;
+/// The first and the last of those that convert.
+pub const CONVERT_F_TO_U: u16 = 109;
+pub const BITCAST: u16 = 124;
+/// The first and the last of those of arithmetic, of comparisons and of bits.
+pub const S_NEGATE: u16 = 126;
+pub const BIT_COUNT: u16 = 205;
+/// The first and the last of barriers and atomics.
+pub const CONTROL_BARRIER: u16 = 224;
+pub const ATOMIC_XOR: u16 = 242;
 pub const I_ADD: u16 = 128;
 pub const I_SUB: u16 = 130;
 pub const I_MUL: u16 = 132;
@@ -56,9 +80,17 @@ pub const LABEL: u16 = 248;
 pub const BRANCH: u16 = 249;
 pub const BRANCH_CONDITIONAL: u16 = 250;
 pub const SWITCH: u16 = 251;
-#[cfg(test)]
 pub const RETURN: u16 = 253;
 pub const UNREACHABLE: u16 = 255;
+pub const EXECUTION_MODE_ID: u16 = 331;
 /// The first and the last of those of subgroups.
 pub const GROUP_NON_UNIFORM_ELECT: u16 = 333;
 pub const GROUP_NON_UNIFORM_QUAD_SWAP: u16 = 366;
+pub const GROUP_NON_UNIFORM_SHUFFLE: u16 = 345;
+pub const COPY_LOGICAL: u16 = 400;
+pub const TYPE_RAY_QUERY: u16 = 4472;
+pub const RAY_QUERY_GET_INTERSECTION_TYPE: u16 = 4479;
+pub const TYPE_ACCELERATION_STRUCTURE: u16 = 5341;
+/// The first and the last of those that ask a ray query.
+pub const RAY_QUERY_GET_RAY_T_MIN: u16 = 6016;
+pub const RAY_QUERY_GET_INTERSECTION_WORLD_TO_OBJECT: u16 = 6032;

@@ -2,6 +2,7 @@
 //! they have read, validated and inlined all of it: nine tenths of the path tracer are effects that a simple scene lacks.
 //!
 //! No instruction that computes something is changed, so results keep their bits as far as a driver's own optimisations are exact.
+use super::compact::compact;
 use super::flow::{self, Flow, Ids, Value, label};
 use super::instruction::{BOUND, HEADER, Instruction, instructions};
 use super::op;
@@ -17,8 +18,8 @@ const SUBGROUP_LOCAL_INVOCATION_ID: u32 = 41;
 const GROUP_NON_UNIFORM: u32 = 61;
 const GROUP_NON_UNIFORM_QUAD: u32 = 68;
 
-/// `module` with its specialisation constants set to `constants`, given as (constant id, value); others keep their defaults. What is no
-/// module is returned as it is, for the driver to refuse.
+/// `module` with its specialisation constants set to `constants`, given as (constant id, value); others keep their defaults. Its ids
+/// are numbered as by [`compact`]. What is no module is returned as it is, for the driver to refuse.
 pub fn specialise(module: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     let Some(instructions) = instructions(module) else { return module.to_vec() };
     let start = instructions.iter().position(|i| i.opcode == op::FUNCTION).unwrap_or(instructions.len());
@@ -37,7 +38,7 @@ pub fn specialise(module: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
         Instruction { opcode: op::UNDEF, words: &[kind, id] }.write(&mut whole);
     }
     whole.extend(specialised.body);
-    whole
+    compact(&whole).unwrap_or(whole)
 }
 
 /// Blocks that control does not reach but that structured control flow asks for, by their labels: merge blocks, and with the header of
