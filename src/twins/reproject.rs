@@ -283,7 +283,8 @@ impl Reprojection<'_> {
         worth(count, change / (self.push.view * self.push.view * h.noise).max(1e-30))
     }
 
-    /// Of samples that several new pixels take, because each of them is smaller at the point than the old one was, a share each.
+    /// Of samples that several new pixels take, because each of them is smaller at the point than the old one was, a share each: of films
+    /// with direct and indirect light apart, which filters read. In others all count.
     pub(super) fn shared_out(&self, count: u32, point: Vec3) -> u32 {
         let [before, after] = [self.previous, self.camera].map(|c| (point - Vec3::from(c.position)).length_squared());
         let width = |camera| pixel_width(camera, self.push.size);
