@@ -3,6 +3,7 @@
 #![cfg(target_os = "linux")]
 use crate::child::{Running, command, scene};
 use crate::command::complains;
+use etcetera::BaseStrategy;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tallow::cost::Document;
@@ -13,9 +14,10 @@ use tempfile::TempDir;
 
 const FILM: &str = "--width 24 --height 24 --reference-spp 64 --validation";
 
-/// A folder whose cache is its own.
+/// A folder whose cache is its own, but for that of llvmpipe: what it has compiled is the same for all.
 fn within(folder: &TempDir, words: &str) -> Command {
     let mut command = command(folder.path(), words);
+    command.env("MESA_SHADER_CACHE_DIR", etcetera::choose_base_strategy().unwrap().cache_dir());
     command.env("XDG_CACHE_HOME", folder.path().join("cache"));
     command
 }
