@@ -186,6 +186,24 @@ fn an_interrupted_frame_is_not_written_and_the_ones_before_are_told() {
     }
 }
 
+/// So an animation can be judged before all of it is there. A preview of all frames stays.
+#[test]
+fn a_preview_of_an_interrupted_sequence_shows_the_frames_before() {
+    use ::image::{AnimationDecoder, codecs::gif::GifDecoder};
+    for (is_there, name) in [(false, "a.gif"), (true, "a.partial.gif")] {
+        let folder = tempfile::tempdir().unwrap();
+        if is_there {
+            std::fs::write(folder.path().join("a.gif"), "whole").unwrap();
+        }
+        let (output, told) = stopped_after_a_frame(&folder, "-o a.####.exr --preview a.gif", "a.0000.exr");
+        complains(&output, 130, &["interrupted in frame ", &format!("; {name} shows those before")]);
+        let gif = std::fs::read(folder.path().join(name)).unwrap();
+        let frames = GifDecoder::new(std::io::Cursor::new(gif)).unwrap().into_frames().count();
+        assert_eq!(told["frames"].as_array().map(Vec::len), Some(frames), "{told}");
+        assert_eq!(is_there, std::fs::read(folder.path().join("a.gif")).unwrap() == b"whole");
+    }
+}
+
 /// A noisy picture under the name of a frame would look like a finished one.
 #[test]
 fn a_frame_is_written_when_it_is_filtered_and_not_before() {

@@ -58,7 +58,8 @@ pub struct Args {
     /// Turn the camera about what it looks at, by so many degrees over all of --frames, from the first one
     #[arg(long, value_name = "DEGREES", value_parser = finite)]
     pub turntable: Option<f64>,
-    /// Write a small animated .gif of all frames; it leaves some out above 50 frames per second, more than viewers show
+    /// Write a small animated .gif of all frames, or of those before an interruption; it leaves some out above 50 frames
+    /// per second, more than viewers show
     #[arg(long, value_name = "FILE")]
     pub preview: Option<PathBuf>,
     /// Render finished frames again
@@ -204,8 +205,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     if let Ok(line) = &ended {
         interrupt::leave_at_once(line.as_deref().unwrap_or("interrupted: all frames are finished"));
     }
-    if let (Ok(None), Some(preview), Some(path)) = (&ended, &preview, &args.preview) {
-        preview.write(path, args.fps)?;
+    let mut shown = Vec::new();
+    if let (Ok(line), Some(preview), Some(path)) = (&ended, &preview, &args.preview) {
+        shown = preview.save(path, args.fps, line.is_none())?;
     }
     let failed = reports.iter().filter(|report| report.error.is_some()).count();
     let (seconds, device) = (begun.elapsed().as_secs_f64(), stage.gpu().info().name.clone());
@@ -215,7 +217,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let interrupted = ended?;
     fail_on_messages(stage.gpu())?;
-    interrupted.iter().for_each(|line| complain(line));
+    let preview: String = shown.iter().map(|path| format!("; {} shows those before", path.display())).collect();
+    interrupted.iter().for_each(|line| complain(&(line.clone() + &preview)));
     Ok(match interrupted {
         Some(_) => Exit::Interrupted,
         None if failed == 0 => Exit::Done,

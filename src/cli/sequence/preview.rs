@@ -1,9 +1,10 @@
 //! `--preview`: the frames of a sequence as a small animated picture.
+use crate::cli::files::{Files, Item};
 use crate::error::{Error, Result};
 use crate::image::{self, Film, WriteOptions, output};
 use ::image::codecs::gif::{GifEncoder, Repeat};
 use ::image::{Delay, DynamicImage, Frame, RgbImage, RgbaImage};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Pixels of the longer edge at most.
 const EDGE: u32 = 480;
@@ -37,14 +38,21 @@ impl Preview {
         Ok(())
     }
 
-    /// Writes what there is, at so many frames per second. Viewers show no more than 50: others are left out.
+    /// Writes what there is, at so many frames per second, and returns where; nothing without a frame. Viewers show no
+    /// more than 50: others are left out. What is not of the `whole` sequence replaces no file.
     ///
     /// # Errors
     /// [`Error::Output`].
-    pub fn write(&self, path: &Path, fps: f64) -> Result<()> {
+    pub fn save(&self, path: &Path, fps: f64, whole: bool) -> Result<Vec<PathBuf>> {
+        if self.0.is_empty() {
+            return Ok(Vec::new());
+        }
         let mut bytes = Vec::new();
         self.encode(&mut bytes, fps).map_err(|e| Error::output(path, e))?;
-        output::write(path, &bytes)
+        let (items, mut files) = ([Item::bytes(path.to_owned(), bytes)], Files::default());
+        let written = [files.save(&items, whole), files.pipe(&items, whole)].concat();
+        files.end();
+        files.failure().map_or(Ok(written), Err)
     }
 
     fn encode(&self, bytes: &mut Vec<u8>, fps: f64) -> std::result::Result<(), ::image::ImageError> {
