@@ -115,6 +115,11 @@ impl Args {
         vec![checkpoint::default_output(&self.scene)]
     }
 
+    /// What filters the film. `none` does so only to fill in indirect light that is not traced for every pixel.
+    pub fn filter(&self, settings: &Settings) -> Option<Method> {
+        self.denoise.filter(|method| !method.is_none() || settings.indirect_stride > 1)
+    }
+
     /// More than radiance is kept only where a file or a filter takes it.
     pub fn wanted(&self) -> Outputs {
         let layers = self.denoise.is_some()
@@ -139,12 +144,12 @@ pub fn run(args: &Args) -> Result<Exit> {
     let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
     args.common.warn(&scene.warnings);
     let gpu = host.time("open device", || args.common.open(args.tracing))?;
-    check_room(args.denoise, &settings, &gpu)?;
     let plan = match plan {
         Some(plan) => Some(plan),
         None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
     };
     let (args, settings) = &planned::applied(args, settings, plan.as_ref())?;
+    check_room(args.filter(settings), settings, &gpu)?;
     check_stride(args, settings)?;
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, settings))?;
     if args.checkpoint.is_some() && !renderer.can_resume() {
@@ -210,7 +215,7 @@ pub fn shoot<'a>(
     begun: Begun,
     mut host: Spans,
 ) -> Result<Option<Taken<'a>>> {
-    let noisy = args.denoise.map(|_| Noisy::of_film(renderer)).transpose()?;
+    let noisy = args.filter(renderer.settings()).map(|_| Noisy::of_film(renderer)).transpose()?;
     let pixel = args.pixel.map(|[x, y]| y * renderer.settings().width + x);
     let Begun { earlier: checkpoint, carries } = begun;
     let job = Job { checkpoint, step_time: Some(STEP_TIME), pixel, carries, ..Job::new(renderer) };

@@ -81,9 +81,14 @@ pub struct Plan {
 ///
 /// # Errors
 /// [`Error::Usage`] for a target out of range or out of reach, for settings with a noise threshold or with a largest number of samples
-/// that their policy does not place by, and for an empty list of methods; [`Error::Device`].
+/// that their policy does not place by, and for an empty list of methods; [`Error::Device`], before anything is rendered for a film that
+/// is too large for one of the filters.
 pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], target: Target) -> Result<Plan> {
     check(settings, methods, target)?;
+    let size = [settings.width, settings.height];
+    if !methods.iter().all(|method| method.is_none()) {
+        filter::check_size(gpu, size, filter::GUIDE_TEXELS)?;
+    }
     let mut probe = Probe::new(gpu, scene, settings, methods)?;
     let levels = probe.levels(target)?;
     let mut forecasts = forecasts(&levels, methods);
@@ -119,7 +124,7 @@ pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], t
     Ok(Plan {
         version: VERSION,
         target,
-        scene: scene.fingerprint([settings.width, settings.height])?.to_string(),
+        scene: scene.fingerprint(size)?.to_string(),
         device: gpu.info().name.clone(),
         settings: Settings { spp: chosen.spp, ..settings.clone() },
         chosen,

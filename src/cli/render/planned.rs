@@ -1,6 +1,7 @@
 //! `--time`, `--error` and `--plan`: a render whose samples and filter are planned, or were planned by an earlier one.
-use super::Args;
+use super::{Args, check_room};
 use crate::cli::files::Item;
+use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::image::input;
@@ -68,11 +69,25 @@ pub fn settings(args: &Args, plan: &Plan, scene: &Scene) -> Result<Settings> {
 /// Plans what is asked for, if something is.
 ///
 /// # Errors
-/// Those of [`plan::plan`].
+/// Those of [`check_room`] and [`plan::plan`].
 pub fn make(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<Option<Plan>> {
     let Some(target) = target(args) else { return Ok(None) };
-    let methods = args.denoise.map_or_else(plan::usual_methods, |method| vec![method]);
+    check_room(args.filter(settings), settings, gpu)?;
+    let methods = args.denoise.map_or_else(|| fitting(args, gpu, settings), |method| vec![method]);
     plan::plan(gpu, scene, settings, &methods, target).map(Some)
+}
+
+/// What a plan may choose among that names no filter, less what this film has no room for, which is said.
+fn fitting(args: &Args, gpu: &Gpu, settings: &Settings) -> Vec<Method> {
+    let mut methods = plan::usual_methods();
+    methods.retain(|method| match check_room(Some(*method), settings, gpu) {
+        Err(why) if !method.is_none() => {
+            args.common.warn(&[format!("the plan leaves out {}: {why}", method.name())]);
+            false
+        }
+        _ => true,
+    });
+    methods
 }
 
 /// The options and settings of the render that a plan asks for.
@@ -96,6 +111,30 @@ pub fn item(args: &Args, plan: Option<&Plan>) -> Result<Option<Item<'static>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::{DeviceOptions, Tuning};
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[test]
+    fn what_a_film_is_too_large_for_is_no_part_of_a_plan() {
+        let tuning = Some(Tuning { longest_edge: 64, ..Tuning::CPU });
+        let gpu = Gpu::open(&DeviceOptions { tuning, ..DeviceOptions::default() }).unwrap();
+        let of_width = |width| Settings { width, height: 1, ..Settings::default() };
+        let args = |words: &[&str]| Command::parse_from([&["render", "scene.toml", "--quiet"], words].concat()).args;
+        let methods = |width| fitting(&args(&["--time", "1s"]), &gpu, &of_width(width));
+        let named = |width| methods(width).into_iter().map(Method::name).collect::<Vec<_>>();
+        assert_eq!((named(64), named(65)), (vec!["none", "auto"], vec!["none"]));
+        let fits = |name: &str, settings: Settings| {
+            check_room(args(&["--denoise", name]).filter(&settings), &settings, &gpu).is_ok()
+        };
+        assert!(fits("auto", of_width(64)) && !fits("auto", of_width(65)) && fits("none", of_width(65)));
+        assert!(!fits("none", Settings { indirect_stride: 2, ..of_width(65) }), "it is filled in");
+    }
 
     #[test]
     fn times_have_units() {

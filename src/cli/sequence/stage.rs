@@ -70,7 +70,7 @@ impl<'a> Stage<'a> {
         }
         args.render.common.warn(&warnings);
         let gpu = args.render.common.open(args.render.tracing)?;
-        render::check_room(args.render.denoise, &settings, &gpu)?;
+        render::check_room(args.render.filter(&settings), &settings, &gpu)?;
         render::check_stride(&args.render, &settings)?;
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         let rest = survey.effects(&settings, args.render.wanted());
@@ -259,7 +259,7 @@ impl<'a> Stage<'a> {
             Some(_) => image::read(first).ok().filter(|film| self.chain.ends_in(film, &self.scene, settings))?,
             None => finished(first, &self.scene, settings)?,
         };
-        (film.metadata.get(FILTERED).map(String::as_str) == args.denoise.map(Method::name)).then_some(film)
+        (film.metadata.get(FILTERED).map(String::as_str) == args.filter(settings).map(Method::name)).then_some(film)
     }
 }
 
