@@ -120,7 +120,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let aovs = aovs(args, &source)?;
     let reference = reference(args, &source)?;
     let start = Instant::now();
-    let (colour, times, notes) = filtered(args, &gpu, &aovs)?;
+    let (colour, times, notes) = as_it_is(args, &aovs).map_or_else(|| filtered(args, &gpu, &aovs), Ok)?;
     let seconds = start.elapsed().as_secs_f64();
     let clean = Clean::new(args, &source, &aovs, colour)?;
     fail_on_messages(&gpu)?;
@@ -147,7 +147,28 @@ pub fn run(args: &Args) -> Result<Exit> {
 fn aovs<'a>(args: &Args, source: &'a Source) -> Result<Aovs<'a>> {
     let unnamed = args.layers.colour.is_none() && source.film.find(None).is_none();
     let remedy = if unnamed { "; name the layer to filter with --colour" } else { "" };
-    Aovs::find(&source.film, &args.layers.names()).map_err(|what| Error::input(&args.image, what + remedy))
+    let find = if asks_for_nothing(args) { Aovs::find_shown } else { Aovs::find };
+    find(&source.film, &args.layers.names()).map_err(|what| Error::input(&args.image, what + remedy))
+}
+
+/// Whether nothing is to be filtered, cut or looked up.
+fn asks_for_nothing(args: &Args) -> bool {
+    let cuts = args.fireflies.is_some_and(|fireflies| fireflies != Fireflies::Off);
+    args.filter.is_none() && !cuts && args.supersampling.scene.is_none()
+}
+
+/// The filter that made the colour, where that stays as it is.
+fn earlier_filter<'a>(args: &Args, film: &'a Film) -> Option<&'a str> {
+    let keeps = asks_for_nothing(args) && !args.layers.colour.as_deref().is_some_and(is_noisy);
+    film.metadata.get(image::FILTERED).filter(|_| keeps).map(String::as_str)
+}
+
+/// What [`filtered`] returns where the colour stays as it is. Indirect light that was not traced for every pixel is filled in, once.
+fn as_it_is(args: &Args, aovs: &Aovs) -> Option<(Colour, Vec<PassTime>, Vec<String>)> {
+    let layers = asks_for_nothing(args).then(|| file::Layers::new(aovs))?;
+    let whole = layers.holds().indirect_stride == 1 || earlier_filter(args, aovs.film).is_some();
+    let note = vec!["filtered: nothing, the colour stays as it is".to_owned()];
+    whole.then(|| (layers.colour(), Vec::new(), [note, layers.notes].concat()))
 }
 
 /// Bytes of host memory that filtering takes besides the file itself: the file's channels and the filtered colour, and then
@@ -164,7 +185,9 @@ fn bytes_needed(args: &Args, claim: &Claim, unified: bool) -> u64 {
 
 /// Checks before decoding, which can take minutes, that the image can be filtered.
 fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
-    filter::check_size(gpu, claim.size, filter::GUIDE_TEXELS)?;
+    if !asks_for_nothing(args) {
+        filter::check_size(gpu, claim.size, filter::GUIDE_TEXELS)?;
+    }
     let bytes = bytes_needed(args, claim, gpu.info().unified);
     let refused =
         |what| format!("{}: filtering its {} x {} pixels {what}", args.image.display(), claim.size[0], claim.size[1]);
@@ -214,7 +237,8 @@ impl Clean {
         let has_layers = |path: &PathBuf| image::has_layers(path);
         let whole = args.outputs.iter().any(has_layers);
         let shown = args.reference.is_some() || !args.outputs.iter().all(has_layers);
-        let encoded = || source.encoded(&channels, aovs.keep_as(), (image::FILTERED, args.filter.name()));
+        let filter = earlier_filter(args, &source.film).unwrap_or(args.filter.name());
+        let encoded = || source.encoded(&channels, aovs.keep_as(), (image::FILTERED, filter));
         Ok(Self {
             exr: whole.then(encoded).transpose()?,
             shown: shown.then(|| source.shown(result_layer(args), &channels)).transpose()?,
@@ -296,7 +320,9 @@ fn distance(picture: &Picture, reference: &Picture) -> Option<Metrics> {
 fn text(args: &Args, s: &Summary) -> String {
     let mut text = s.notes.iter().map(|note| readable(note) + "\n").collect::<String>();
     text += &format!("{} x {}, {} in {:.3} s on {}\n", s.width, s.height, s.filter, s.seconds, s.device);
-    text += &table::timing_table(&s.passes);
+    if !s.passes.is_empty() {
+        text += &table::timing_table(&s.passes);
+    }
     if args.reference.is_some() {
         text += &metrics_table(&s.before, &s.after);
     }

@@ -29,17 +29,21 @@ pub enum Aov {
 }
 
 /// An AOV, its name in messages, and the layer names that renderers give it, the best first.
+#[derive(Clone, Copy)]
 struct Known {
     aov: Aov,
     label: &'static str,
     names: &'static [&'static str],
 }
 
+/// The colour that a file shows, which goes by no name of these.
+const SHOWN: Known = Known { aov: Aov::Colour, label: "colour", names: &[] };
+
 /// Blender names channels `ViewLayer.NAME.R`; its "Denoising" passes are made for filters. In Mitsuba the user chooses
 /// the names; these are the ones in its documentation. pbrt has `Albedo.R`, `Ns.X`, `P.X`, `Variance.R`; Octane
 /// `Denoiser_albedo.R`; V-Ray `diffuseFilter.R`; Arnold `diffuse_albedo.R`; Unreal `FinalImageBaseColor.R`.
 const KNOWN: &[Known] = &[
-    Known { aov: Aov::Colour, label: "colour", names: &[NOISY] },
+    Known { names: &[NOISY], ..SHOWN },
     Known { aov: Aov::Direct, label: "direct light", names: &["direct"] },
     Known { aov: Aov::Indirect, label: "indirect light", names: &["indirect"] },
     Known {
@@ -121,6 +125,18 @@ impl<'a> Aovs<'a> {
     /// When there is no colour or no pixel of it is a finite number, when a layer named by the user is missing, or when
     /// a layer covers other pixels than the colour.
     pub fn find(film: &'a Film, names: &Names) -> Result<Self, String> {
+        Self::find_of(film, names, KNOWN)
+    }
+
+    /// The same, but unless the user names another colour it is the one that is shown, though it was filtered and the noisy one is there.
+    ///
+    /// # Errors
+    /// As [`Aovs::find`].
+    pub fn find_shown(film: &'a Film, names: &Names) -> Result<Self, String> {
+        Self::find_of(film, names, &[&[SHOWN], &KNOWN[1..]].concat())
+    }
+
+    fn find_of(film: &'a Film, names: &Names, all: &[Known]) -> Result<Self, String> {
         let given = names.get(&Aov::Colour).map(String::as_str);
         // The noisy image is the input of the filter and is never replaced.
         let shown = film
@@ -135,7 +151,7 @@ impl<'a> Aovs<'a> {
             samples_of_all: names.get(&Aov::Samples).and_then(|told| number(told)),
             notes: Vec::new(),
         };
-        for known in KNOWN {
+        for known in all {
             if let (Aov::Samples, Some(number)) = (known.aov, found.samples_of_all) {
                 found.notes.push(format!("samples: {number} in every pixel, as given"));
                 continue;

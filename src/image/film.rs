@@ -173,7 +173,7 @@ impl Film {
     ///
     /// Without a name, the layer is the colour: the channels R, G, B, or a layer that other programs use for it
     /// (`ViewLayer.Combined`, `rgba`), or the only layer with R, G, B, or grey (Y). A name matches in full or by its last part,
-    /// regardless of case.
+    /// regardless of case; `RGB` are the channels R, G, B where no layer is called so.
     ///
     /// # Errors
     /// When there is no such layer or more than one, with a list of all channels, or when memory is out.
@@ -237,6 +237,7 @@ impl Film {
                 .triple(layer, ["R", "G", "B"])
                 .or_else(|| self.triple(layer, ["X", "Y", "Z"]))
                 .or_else(|| self.grey(|c| split(&c.name).0 == *layer && split(&c.name).1 != "A")),
+            None if found.is_empty() && wanted.eq_ignore_ascii_case("RGB") => self.triple("", ["R", "G", "B"]),
             None => self.grey(|c| c.name.eq_ignore_ascii_case(wanted)),
         }
     }

@@ -27,6 +27,9 @@ fn a_sparse_render_is_filled_in_at_once_or_from_its_file() {
     let black = |picture: &image::Picture| picture.pixels.iter().filter(|pixel| **pixel == [0.0; 3]).count();
     let (before, after) = (black(&noisy), black(&clean));
     assert!(before > 3 * after, "{before} black pixels, then {after}");
+    // What was filled in stays so.
+    run(&["filter", "clean.exr", "--filter", "none", "-o", "again.exr"]);
+    assert_eq!(colour("again.exr").pixels, clean.pixels);
     // More samples join as any others.
     render(&["--spp", "8", "--resume", "noisy.exr", "-o", "more.exr"]);
     render(&["--spp", "8", "-o", "whole.exr"]);

@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Layers (found by their usual names when not given)")]
 pub struct Layers {
-    /// Radiance; the filtered image takes its place
+    /// Radiance; the filtered image takes its place. RGB are the channels R, G, B where no layer is called so
     #[arg(long, value_name = "NAME")]
     pub colour: Option<String>,
     /// Reflectance of the first hit

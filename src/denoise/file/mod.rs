@@ -76,6 +76,18 @@ impl<'a> Layers<'a> {
         self.aovs.film.metadata.get(INDIRECT_STRIDE).and_then(|n| n.parse().ok()).unwrap_or(1).max(1)
     }
 
+    /// The colour as it is, a plane a channel; a pixel of it that is no number becomes 0.
+    pub fn colour(&self) -> [Vec<f32>; 3] {
+        let pixels = self.aovs.film.pixels();
+        let mut planes = [0; 3].map(|_| Vec::with_capacity(pixels));
+        let Some(stored) = self.aovs.get(Aov::Colour) else { return planes };
+        for pixel in (0..pixels).map(|i| stored.at(i)) {
+            let known = pixel.iter().all(|v| v.is_finite());
+            planes.iter_mut().zip(pixel).for_each(|(plane, v)| plane.push(if known { v } else { 0.0 }));
+        }
+        planes
+    }
+
     /// Copies the file's pixels to the device.
     ///
     /// # Errors
