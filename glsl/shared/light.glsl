@@ -1,5 +1,4 @@
-// Choice of a light by an alias table in proportion to power, or of point and spot lights by what they bring, sampling of a point on
-// it, and the densities for MIS.
+// Choice of a light by an alias table in proportion to power, or by what it brings, sampling of a point on it, and the densities for MIS.
 #include "shared/surface.glsl"
 #include "shared/segment.glsl"
 #include "shared/luminance.glsl"
@@ -8,6 +7,7 @@ layout(binding = 7) uniform usamplerBuffer lights; // of Light
 layout(binding = 8) uniform usamplerBuffer light_table; // of AliasEntry
 layout(binding = 9) uniform samplerBuffer environment; // of vec4
 layout(binding = 10) uniform usamplerBuffer environment_table; // of AliasEntry
+layout(binding = 20) uniform usamplerBuffer light_nodes; // of LightNode
 
 struct LightSample {
     vec3 direction; // unit, from the surface to the light
@@ -239,34 +239,15 @@ bool is_triangle_light(uint kind) { return kind == LIGHT_TRIANGLE || kind == LIG
 
 bool is_sphere_light(uint kind) { return FX_SPHERES && kind == LIGHT_SPHERE; }
 
-// What a light of value 1 that is not infinitely far away brings to a receiver from which it is seen, up to a factor that all have. That of
-// a lamp is taken at its middle, with cosines that are larger by `rim`: so large they may be elsewhere on it.
+// What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
 float unshadowed(Light light, Receiver r) {
     vec3 to_light = light.a - r.position;
-    float extent2 = 0.0, emits = 1.0; // the square of how far it reaches from its middle; its intensity, of value 1
-    bool panel = FX_RESAMPLED_LIGHTS && is_triangle_light(light.kind);
-    vec3 e1 = light.b - light.a, e2 = light.c - light.a;
-    if (panel) {
-        to_light += (e1 + e2) / 3.0;
-        extent2 = max(dot(e1, e1), dot(e2, e2));
-    } else if (FX_RESAMPLED_LIGHTS && is_sphere_light(light.kind)) {
-        extent2 = light.b.x * light.b.x;
-        emits = PI * extent2;
-    }
-    float d2 = max(dot(to_light, to_light) + extent2, 1e-30);
+    float d2 = max(dot(to_light, to_light), 1e-30), emits = 1.0;
     vec3 w = to_light * inversesqrt(d2);
-    float cosine = dot(r.normal, w), rim = sqrt(extent2 / d2);
+    float cosine = dot(r.normal, w);
     if (r.lets_light_through) cosine = abs(cosine);
-    cosine += rim;
-    if (panel) {
-        vec3 n = cross(e1, e2); // as long as twice the area
-        float towards = -dot(n, w);
-        bool two_sided = FX_TWO_SIDED_LAMPS && (Material_flags(materials, light.material) & MATERIAL_EMITS_BEHIND) != 0u;
-        if (two_sided) towards = abs(towards);
-        emits = towards > 0.0 ? 0.5 * (towards + rim * length(n)) : 0.0;
-    }
     if (FX_SPOT && light.kind == LIGHT_SPOT) emits = spot_share(light, w);
-    float brings = emits * (cosine + r.odds_beyond_cosine) / d2;
+    float brings = min(emits * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2, MAX_ODDS);
     return cosine > 0.0 || r.lets_light_through ? brings : 0.0;
 }
 
@@ -288,7 +269,7 @@ Light choose_by_share(Receiver r, float u) {
         if (is_triangle_light(light.kind) || light.kind == LIGHT_SPHERE) break;
         if (!is_point_or_spot(light.kind)) continue;
         group += light.probability;
-        float brings = min(unshadowed(light, r) * luminance(light.value), MAX_ODDS);
+        float brings = unshadowed(light, r);
         sum += brings;
         number += brings > 0.0 ? 1.0 : 0.0;
         float share = brings > 0.0 ? (even ? 1.0 / number : brings / sum) : 0.0;
@@ -305,87 +286,19 @@ Light choose_by_share(Receiver r, float u) {
     return chosen;
 }
 
-// Lights among which one is chosen, in a scene of many. Measured with 8 at 8 samples a pixel: a corridor with 100 lamps has .23 of the
-// relMSE that choice by power leaves, Sibenik with 150 of them .29, a bulb of 1,520 triangles in a room .32, a ceiling panel of 512 .78, in
-// 1.1 to 1.3 of the paths' time.
-const uint CANDIDATES = 8u;
-
-// Whether one such is chosen from several. Those that choose_by_share weighs stay apart.
-bool is_resampled(uint kind) {
-    return FX_RESAMPLED_LIGHTS && (is_triangle_light(kind) || is_sphere_light(kind) || (!FX_WEIGHED_LIGHTS && is_point_or_spot(kind)));
-}
-
-// How much more often than by their power delta lights are chosen. Lamps and sky are found by BSDF sampling as well, delta lights by
-// light sampling alone. Measured at 8 samples a pixel (`scenes/grass`, sun and sky): weights of 1, 4, 8 and 16 leave a relMSE of .0216, .0135,
-// .0120 and .0112; Crytek Sponza at 4 samples behaves alike. More would starve lamps beside a strong sun.
-const float DELTA_WEIGHT = 8.0;
-
-// What the table counts of a light of value 1 that may be resampled, over pi.
-float table_weight(Light light) {
-    if (is_triangle_light(light.kind) || is_sphere_light(light.kind)) {
-        bool two_sided = FX_TWO_SIDED_LAMPS && (Material_flags(materials, light.material) & MATERIAL_EMITS_BEHIND) != 0u;
-        bool sphere = is_sphere_light(light.kind);
-        float area = sphere ? 4.0 * PI * light.b.x * light.b.x : 0.5 * length(cross(light.b - light.a, light.c - light.a));
-        return two_sided ? 2.0 * area : area;
-    }
-    vec2 sines = sin(0.5 * light.c.xy);
-    return DELTA_WEIGHT * (FX_SPOT && light.kind == LIGHT_SPOT ? 2.0 * dot(sines, sines) : 4.0);
-}
-
-// Chooses anew between the light that `word` chooses by the table, which is within the scene, and others, by what each would bring if
-// nothing were in its way (resampled importance sampling: Talbot, Cline and Egbert 2005). How bright a lamp is on average, pictures and
-// masks included, decides how often it is a candidate, and not what it weighs then. Returns the factor of its radiance. The words of the
-// candidates are evenly spaced, and where all bring the same, `word` has its way: so the choice stays as well stratified as it is.
-float resample(Receiver r, uint word, inout Light light) {
-    const uint SPACING = 0xffffffffu / CANDIDATES + 1u;
-    uint count = push.constants.light_count, own = word / SPACING, indices[CANDIDATES];
-    float weights[CANDIDATES];
-    float number = 0.0, before = 0.0, sum = 0.0, positive = 0.0;
-    for (uint i = 0u; i < CANDIDATES; i++) {
-        uint at = word % SPACING + i * SPACING;
-        indices[i] = alias_choose(AliasEntry_load(light_table, alias_slot(count, at)), count, at);
-        Light candidate = Light_load(lights, indices[i]);
-        bool counts = is_resampled(candidate.kind);
-        weights[i] = counts ? min(unshadowed(candidate, r) / max(table_weight(candidate), 1e-30), MAX_ODDS) : 0.0;
-        sum += weights[i];
-        positive += weights[i] > 0.0 ? 1.0 : 0.0;
-        number += counts ? 1.0 : 0.0;
-        before += counts && i < own ? 1.0 : 0.0;
-    }
-    if (sum <= 0.0) return 0.0;
-    float u = min((before + unit_interval(pcg(word))) / number, BELOW_ONE), chosen = 0.0;
-    uint index = 0u;
-    for (uint i = 0u; i < CANDIDATES; i++) {
-        float share = weights[i] > 0.0 ? mix(weights[i] / sum, 1.0 / positive, EVEN_SHARE) : 0.0;
-        if (share > 0.0 && u >= 0.0) { // in the end the last, if rounding leaves something
-            index = indices[i];
-            chosen = share;
-        }
-        u -= share;
-    }
-    light = Light_load(lights, index);
-    return 1.0 / (number * chosen);
-}
-
-// MIS takes a light that is resampled to be chosen so many times as often as the table says, which those are that count, but at most always.
-// Any number will do that is the same however a point of the light is found.
-const float BOOST = 3.0;
-
-float boost(float probability) {
-    return FX_RESAMPLED_LIGHTS ? min(BOOST, 1.0 / probability) : 1.0;
-}
+#include "shared/light_tree.glsl"
 
 // Samples one light for a receiver. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(Receiver r, uint word, vec2 u) {
     vec3 p = r.position;
     LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, false);
     uint count = push.constants.light_count, index = 0u, rest = word;
-    if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, rest);
+    float probability = 0.0;
+    if (FX_LIGHT_TREE) index = choose_light(r, rest, probability);
+    else if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, rest);
     Light light = Light_load(lights, index);
+    if (FX_LIGHT_TREE && probability > 0.0) light.probability = probability;
     if (FX_WEIGHED_LIGHTS && is_point_or_spot(light.kind)) light = choose_by_share(r, u.x);
-    float factor = 1.0;
-    bool resampled = is_resampled(light.kind);
-    if (resampled) factor = resample(r, word, light);
     bool often = light.probability >= SHARP_PROBABILITY;
     if (FX_EMISSIVE && is_triangle_light(light.kind)) {
         sample_triangle_light(p, light, u, s);
@@ -407,23 +320,17 @@ LightSample light_sample(Receiver r, uint word, vec2 u) {
     } else if (FX_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         sample_environment(index, light.probability, rest, u, s);
     }
-    if (resampled) {
-        s.radiance *= factor;
-        s.pdf *= boost(light.probability);
+    if (FX_LIGHT_TREE && FX_EMISSIVE && s.pdf > 0.0 && (is_triangle_light(light.kind) || is_sphere_light(light.kind))) {
+        float density = push.constants.triangle_pdf_scale * Material_emission_weight(materials, light.material);
+        s.pdf = nominal_pdf(density, light.probability / s.pdf, p);
     }
+    if (FX_LIGHT_TREE && probability == 0.0) s.radiance = vec3(0.0);
     return s;
 }
 
-// Density per solid angle with which light_sample would choose, from `origin`, the point of an emissive triangle or sphere that
-// a ray hits at `t` under `cosine`.
-float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
-    float density = push.constants.triangle_pdf_scale * Material_emission_weight(materials, s.material); // over area
-    if (FX_RESAMPLED_LIGHTS) {
-        float doubled_area;
-        unit_vector(cross(s.e1, s.e2), doubled_area);
-        float area = FX_SPHERES && s.radius > 0.0 ? 4.0 * PI * s.radius * s.radius : 0.5 * doubled_area;
-        density *= boost(density * area);
-    }
+// Density per solid angle with which light_sample would choose, from `origin`, the point of an emissive triangle or sphere that a ray hits
+// at `t` under `cosine`, if lights were chosen by the table. `density` is that over area.
+float table_pdf(float density, Surface s, vec3 origin, float t, float cosine) {
     if (FX_SPHERES && s.radius > 0.0) {
         float cap = sphere_cap(s.corner - origin, s.radius);
         return cap > 0.0 ? density * 2.0 * s.radius * s.radius / cap : 0.0; // times the area, over 2 pi times the cap
@@ -435,4 +342,15 @@ float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
         if (by_solid_angle(solid_angle)) return density * 0.5 * doubled_area / solid_angle;
     }
     return density * t * t / max(cosine, 1e-20);
+}
+
+// The same, however lights are chosen; with a tree the nominal one.
+float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
+    float density = push.constants.triangle_pdf_scale * Material_emission_weight(materials, s.material);
+    float pdf = table_pdf(density, s, origin, t, cosine);
+    if (!FX_LIGHT_TREE || pdf <= 0.0) return pdf;
+    float doubled_area;
+    unit_vector(cross(s.e1, s.e2), doubled_area);
+    float area = FX_SPHERES && s.radius > 0.0 ? 4.0 * PI * s.radius * s.radius : 0.5 * doubled_area;
+    return nominal_pdf(density, density * area / pdf, origin);
 }

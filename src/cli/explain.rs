@@ -319,11 +319,8 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
             lights.count() * (size_of::<Light>() + size_of::<AliasEntry>())
         }
         // A sphere takes the record of a triangle, and these lights are only sampled in another way.
-        Effect::spheres
-        | Effect::large_lamps
-        | Effect::two_sided_lamps
-        | Effect::weighed_lights
-        | Effect::resampled_lights => 0,
+        Effect::spheres | Effect::large_lamps | Effect::two_sided_lamps | Effect::weighed_lights => 0,
+        Effect::light_tree => size_of_val(&scene.light_nodes[..]),
         // Every texture has room for these, and every material for its cutoff.
         Effect::texture_modes | Effect::hdr_textures | Effect::alpha_cutoff => 0,
         // Every material has room for the parameters of all BSDFs.

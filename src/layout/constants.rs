@@ -100,4 +100,6 @@ constants! {
     LIGHT_SPHERE: uint = 5;
     /// [`Light::kind`]: as [`LIGHT_TRIANGLE`], of a mirrored instance: `b` is the third corner of the stored triangle, `c` the second.
     LIGHT_MIRRORED: uint = 6;
+    /// [`LightNode::child`]: what remains is the index of a light.
+    LIGHT_LEAF: uint = 0x80000000;
 }

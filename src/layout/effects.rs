@@ -154,8 +154,8 @@ effects! {
     two_sided_lamps: FX_TWO_SIDED_LAMPS;
     /// Up to 32 point and spot lights, one of which is chosen by what it would bring.
     weighed_lights: FX_WEIGHED_LIGHTS;
-    /// Many lights within the scene: one of several candidates is chosen by what it would bring.
-    resampled_lights: FX_RESAMPLED_LIGHTS;
+    /// Many lights within the scene: one is chosen by a tree over them.
+    light_tree: FX_LIGHT_TREE;
     /// Exact spheres among the triangles.
     spheres: FX_SPHERES;
     /// What lamps and sky bring to the first hit goes with indirect light.

@@ -237,6 +237,25 @@ gpu_structs! {
         material: uint,
     }
 
+    /// A node of the tree over the lights of a scene of many. 2 texels. The root is the first. Behind it lie the lights outside of the
+    /// tree, with their probabilities as `power`, and then groups of siblings.
+    struct LightNode {
+        /// Middle of the lights below it, world units.
+        centre: vec3,
+        /// Distance from there within which they lie.
+        radius: float,
+        /// Mean of the directions in which they shine brightest, by power, octahedral as normals.
+        axis: uint,
+        /// Two snorms of 16 bits, the first in the low half. Cosine of the largest angle to `axis` under which one of them shines, -1 for those
+        /// that shine all round or from both sides; and how far the mean of the directions in which panels shine brightest reaches along `axis`, 0
+        /// if there are none, -1 if all are panels in one plane.
+        beams: uint,
+        /// Sum of their powers, of spots as if they shone all round, in a unit in which that of the root is the probability of all; 0 without any.
+        power: float,
+        /// Index of the first of its children, or of the light that it is, with [`LIGHT_LEAF`].
+        child: uint,
+    }
+
     /// One slot of an alias table (Walker 1977, Vose 1991) over n entries. From a 32-bit random word r, the slot is
     /// the high word of r * n; the low word picks the slot itself when below `threshold`, its alias otherwise.
     struct AliasEntry {

@@ -2,10 +2,14 @@
 //! `glsl/shared/octahedral.glsl`.
 use glam::{Vec2, Vec3, vec2, vec3};
 
-/// Unit normal from two snorm words of 16 bits.
+/// Two numbers of [-1, 1] from snorms of 16 bits, the first in the low half.
+pub fn snorms(bits: u32) -> [f32; 2] {
+    [bits, bits >> 16].map(|b| (f32::from(b as u16 as i16) / 32767.0).max(-1.0))
+}
+
+/// Unit normal from two snorms of 16 bits.
 pub fn octahedral_decode(bits: u32) -> Vec3 {
-    let snorm = |b: u32| (f32::from(b as u16 as i16) / 32767.0).max(-1.0);
-    octahedral_vector(vec2(snorm(bits), snorm(bits >> 16)))
+    octahedral_vector(snorms(bits).into())
 }
 
 /// Unit vector that a point of the unfolded octahedron, the square [-1, 1]^2, stands for.

@@ -29,6 +29,8 @@ pub struct DeviceScene {
     pub lights: Buffer<Light>,
     /// See [`Scene`].
     pub light_table: Buffer<AliasEntry>,
+    /// See [`Scene`].
+    pub light_nodes: Buffer<LightNode>,
     /// See [`crate::scene::Environment`].
     pub environment: Buffer<vec4>,
     /// See [`crate::scene::Environment`].
@@ -77,6 +79,7 @@ impl DeviceScene {
             },
             lights: Buffer::from_texels(gpu, "lights", &scene.lights)?,
             light_table: Buffer::from_texels(gpu, "light_table", &scene.light_table)?,
+            light_nodes: Buffer::from_texels(gpu, "light_nodes", &scene.light_nodes)?,
             environment: Buffer::from_texels(gpu, "environment", environment.map_or(&[], |e| &e.texels[..]))?,
             environment_table: Buffer::from_texels(
                 gpu,
@@ -119,6 +122,7 @@ impl DeviceScene {
         crate::shaders::shared::light::Bind {
             lights: &self.lights,
             light_table: &self.light_table,
+            light_nodes: &self.light_nodes,
             environment: &self.environment,
             environment_table: &self.environment_table,
         }
@@ -144,7 +148,7 @@ impl DeviceScene {
             ("materials", self.materials.raw().size),
             ("textures", self.textures.raw().size),
             ("texels", self.texels.raw().size),
-            ("lights", self.lights.raw().size + self.light_table.raw().size),
+            ("lights", self.lights.raw().size + self.light_table.raw().size + self.light_nodes.raw().size),
             ("environment", self.environment.raw().size + self.environment_table.raw().size),
         ];
         sizes.extend(self.world.iter().map(|world| ("acceleration", world.acceleration().bytes())));

@@ -348,8 +348,8 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     let independent_sampler = settings.sampler == Sampler::Independent;
     // Lamps and sky may come to shine later.
     let soft_light = settings.split == Split::Soft;
-    let Scene { large_lamps, weighed_lights, resampled_lights, .. } = *scene;
-    Effects { independent_sampler, large_lamps, weighed_lights, resampled_lights, soft_light, ..Effects::ALL }
+    let Scene { large_lamps, weighed_lights, light_tree, .. } = *scene;
+    Effects { independent_sampler, large_lamps, weighed_lights, light_tree, soft_light, ..Effects::ALL }
 }
 
 /// Bytes of device memory that samples in flight take in a render with these effects.

@@ -125,6 +125,7 @@ fn upload(gpu: &Gpu, rec: &mut Recorder, to: &mut DeviceScene, scene: &Scene, ch
     if change.lights {
         whole(gpu, rec, "lights", &mut to.lights, &scene.lights)?;
         whole(gpu, rec, "light_table", &mut to.light_table, &scene.light_table)?;
+        whole(gpu, rec, "light_nodes", &mut to.light_nodes, &scene.light_nodes)?;
     }
     Ok(())
 }

@@ -6,9 +6,10 @@ use super::build::coat::reads_table;
 use super::{Environment, Scene};
 use crate::error::{Error, Result};
 use crate::layout::{
-    AliasEntry, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, Material, NONE, SPHERE, Shading, TRAVERSAL_STACK, Texture,
-    Triangle,
+    AliasEntry, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_LEAF, LightNode, Material, NONE, SPHERE, Shading,
+    TRAVERSAL_STACK, Texture, Triangle,
 };
+use crate::shaders::shared::light_tree::CHILDREN;
 use glam::Vec3;
 
 type Checked = std::result::Result<(), String>;
@@ -153,7 +154,26 @@ impl Scene {
             below("it", "material", self.materials.len(), [light.material]).map_err(of)?;
         }
         table_fits("light_table", &self.light_table, self.lights.len())?;
+        self.light_tree_fits()?;
         self.environment.as_ref().map_or(Ok(()), environment_fits)
+    }
+
+    /// Children lie behind their parents, so that every way down ends.
+    fn light_tree_fits(&self) -> Checked {
+        let count = self.light_nodes.len();
+        if self.light_tree && self.light_nodes.is_empty() {
+            return Err("light_nodes: a tree over the lights needs a root".into());
+        }
+        let lights = self.light_nodes.iter().filter(|n| n.child & LIGHT_LEAF != 0 && n.power > 0.0);
+        below("node of lights", "light", self.lights.len(), lights.map(|n| n.child & !LIGHT_LEAF))?;
+        let inner = self.light_nodes.iter().enumerate().filter(|(_, n)| n.child & LIGHT_LEAF == 0);
+        let lost =
+            |&(i, n): &(usize, &LightNode)| n.child as usize <= i || n.child as usize + CHILDREN as usize > count;
+        // A root without lights below it has no children.
+        match inner.filter(|(_, n)| n.power > 0.0).find(lost) {
+            Some((index, node)) => Err(format!("node {index} of lights names children {} of {count}", node.child)),
+            None => Ok(()),
+        }
     }
 }
 

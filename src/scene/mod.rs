@@ -4,7 +4,7 @@
 //! the arrays of both. A front end for another format is a file of `load` that makes a description.
 use crate::error::{Error, Result};
 use crate::image::input;
-use crate::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
+use crate::layout::{AliasEntry, BvhNode, Camera, Instance, Light, LightNode, Material, Shading, Texture, Triangle};
 use crate::scene::description::settings::Settings;
 use crate::threads;
 use animation::{Animation, Mover};
@@ -97,8 +97,10 @@ pub struct Scene {
     /// Whether one of the point and spot lights is chosen by what each would bring to the point that is lit, as where there are from two,
     /// be they dark now, to 32 that shine. It stays as the scene was loaded, too.
     pub weighed_lights: bool,
-    /// Whether lamps are chosen from several that the table has chosen, by what each would bring, as where there are many. It stays, too.
-    pub resampled_lights: bool,
+    /// Whether lamps are chosen by a tree over them, as where there are many. It stays, too.
+    pub light_tree: bool,
+    /// Nodes of that tree, see `scene/build/light_tree.rs`; empty without.
+    pub light_nodes: Vec<LightNode>,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
     /// Fingerprint of all that decides the picture but camera and settings, in the order of the files. Triangles are added before

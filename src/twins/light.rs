@@ -1,38 +1,18 @@
 //! Twin of `glsl/shared/light.glsl`.
 use crate::layout::*;
-use crate::math::hash::{pcg, unit_interval};
+use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
 use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
 use crate::shaders::shared::light::{
-    BELOW_ONE, BOOST, CANDIDATES, DELTA_WEIGHT, EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE,
-    SHARP_PROBABILITY,
+    BELOW_ONE, EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY,
 };
+use crate::twins::light_tree::{choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
 use glam::{Mat3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles, vec2, vec3};
 use std::f32::consts::PI;
-
-/// What light is sampled for.
-#[derive(Clone, Copy, Debug)]
-pub struct Receiver {
-    /// World units.
-    pub position: Vec3,
-    /// Unit normal of the lobes, on the viewer's side.
-    pub normal: Vec3,
-    /// Whether light from the other side counts, too.
-    pub lets_light_through: bool,
-    /// Added to the cosine in the odds of a light, for lobes that reflect more than the cosine says.
-    pub odds_beyond_cosine: f32,
-}
-
-impl Receiver {
-    /// A point that light from everywhere reaches alike.
-    pub fn point(position: Vec3) -> Self {
-        Self { position, normal: Vec3::ZERO, lets_light_through: true, odds_beyond_cosine: 1.0 }
-    }
-}
 
 /// One light, seen from a surface point.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +30,7 @@ pub struct LightSample {
 }
 
 pub use crate::shaders::shared::segment::INFINITE_DISTANCE;
+pub use crate::twins::light_tree::Receiver;
 
 /// The entry that a random word chooses, and a word that is independent of it and as well stratified.
 pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
@@ -235,42 +216,15 @@ fn is_sharp(light: &Light) -> bool {
     light.probability >= SHARP_PROBABILITY
 }
 
-/// Share of a spot's intensity along `w`, from the point that it lights.
-fn spot_share(light: &Light, w: Vec3) -> f32 {
-    let axis = Vec3::from(light.b);
-    let angle = axis.cross(w).length().atan2(-axis.dot(w));
-    let [full, cut, _] = light.c;
-    ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0)
-}
-
-/// What a light of value 1 that is not infinitely far away brings to a receiver from which it is seen, up to a factor that all have.
-fn unshadowed(scene: &Scene, light: &Light, r: &Receiver) -> f32 {
-    let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
-    let (e1, e2) = (b - a, c - a);
-    let is_panel = matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED);
-    let (middle, extent2) = match light.kind {
-        LIGHT_TRIANGLE | LIGHT_MIRRORED => (a + (e1 + e2) / 3.0, e1.dot(e1).max(e2.dot(e2))),
-        LIGHT_SPHERE => (a, b.x * b.x),
-        _ => (a, 0.0),
-    };
-    let to_light = middle - r.position;
-    let d2 = (to_light.dot(to_light) + extent2).max(1e-30);
+/// What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
+fn unshadowed(light: &Light, r: &Receiver) -> f32 {
+    let to_light = Vec3::from(light.a) - r.position;
+    let d2 = to_light.dot(to_light).max(1e-30);
     let w = to_light / d2.sqrt();
     let cosine = r.normal.dot(w);
-    let rim = (extent2 / d2).sqrt();
-    let cosine = if r.lets_light_through { cosine.abs() } else { cosine } + rim;
-    let emits = match light.kind {
-        LIGHT_SPHERE => PI * extent2,
-        LIGHT_SPOT => spot_share(light, w),
-        _ if is_panel => {
-            let n = e1.cross(e2);
-            let two_sided = scene.materials[light.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
-            let towards = if two_sided { n.dot(w).abs() } else { -n.dot(w) };
-            if towards > 0.0 { 0.5 * (towards + rim * n.length()) } else { 0.0 }
-        }
-        _ => 1.0,
-    };
-    let brings = emits * (cosine + r.odds_beyond_cosine) / d2;
+    let cosine = if r.lets_light_through { cosine.abs() } else { cosine };
+    let emits = if light.kind == LIGHT_SPOT { spot_share(light, w) } else { 1.0 };
+    let brings = (emits * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2).min(MAX_ODDS);
     if cosine > 0.0 || r.lets_light_through { brings } else { 0.0 }
 }
 
@@ -283,7 +237,7 @@ fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
     let before_surfaces = scene.lights.iter().take_while(|light| !light.has_surface());
     for light in before_surfaces.filter(|light| light.is_point_or_spot()) {
         group += light.probability;
-        let brings = (unshadowed(scene, light, r) * luminance(light.value)).min(MAX_ODDS);
+        let brings = unshadowed(light, r);
         sum += brings;
         number += if brings > 0.0 { 1.0 } else { 0.0 };
         let share = match brings > 0.0 {
@@ -310,57 +264,6 @@ fn mixed(share: f32, number: f32) -> f32 {
     share * (1.0 - EVEN_SHARE) + 1.0 / number * EVEN_SHARE
 }
 
-/// Whether one of several such is chosen.
-fn is_resampled(scene: &Scene, light: &Light) -> bool {
-    scene.resampled_lights && !light.is_far() && !(scene.weighed_lights && light.is_point_or_spot())
-}
-
-/// What the table counts of a light of value 1 that may be resampled, over pi.
-fn table_weight(scene: &Scene, light: &Light) -> f32 {
-    let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
-    let area = match light.kind {
-        LIGHT_SPHERE => 4.0 * PI * b.x * b.x,
-        LIGHT_TRIANGLE | LIGHT_MIRRORED => 0.5 * (b - a).cross(c - a).length(),
-        LIGHT_SPOT => return DELTA_WEIGHT * 2.0 * (0.5 * c.truncate()).map(f32::sin).length_squared(),
-        _ => return DELTA_WEIGHT * 4.0,
-    };
-    let two_sided = scene.materials[light.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
-    if two_sided { 2.0 * area } else { area }
-}
-
-/// Chooses anew between a light that the table has chosen and others that it chooses likewise, and returns the factor of its radiance.
-fn resample(scene: &Scene, r: &Receiver, word: u32, light: &mut Light) -> f32 {
-    let spacing = u32::MAX / CANDIDATES + 1;
-    let own = word / spacing;
-    let (mut number, mut before, mut candidates) = (0.0, 0.0, Vec::new());
-    for i in 0..CANDIDATES {
-        let candidate = scene.lights[alias_choose(&scene.light_table, word % spacing + i * spacing).0 as usize];
-        let counts = is_resampled(scene, &candidate);
-        let weight = (unshadowed(scene, &candidate, r) / table_weight(scene, &candidate).max(1e-30)).min(MAX_ODDS);
-        candidates.push((candidate, if counts { weight } else { 0.0 }));
-        number += if counts { 1.0 } else { 0.0 };
-        before += if counts && i < own { 1.0 } else { 0.0 };
-    }
-    let sum: f32 = candidates.iter().map(|(_, weight)| weight).sum();
-    candidates.retain(|(_, weight)| *weight > 0.0);
-    let positive = candidates.len() as f32;
-    let mut u = ((before + unit_interval(pcg(word))) / number).min(BELOW_ONE);
-    let mut factor = 0.0;
-    for (candidate, weight) in candidates {
-        let share = mixed(weight / sum, positive);
-        if u >= 0.0 {
-            (*light, factor) = (candidate, 1.0 / (number * share));
-        }
-        u -= share;
-    }
-    factor
-}
-
-/// How many times as often as the table says MIS takes a light of this probability to be chosen.
-fn boost(scene: &Scene, probability: f32) -> f32 {
-    if scene.resampled_lights { BOOST.min(1.0 / probability) } else { 1.0 }
-}
-
 fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     let to_light = Vec3::from(light.a) - p;
     let d2 = to_light.dot(to_light).max(1e-30);
@@ -375,13 +278,18 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
 
 /// One light for a receiver. Radiance is 0 when the light cannot reach the point.
 pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSample {
-    let (chosen, rest) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
+    let ((chosen, rest), probability) = match scene.light_tree {
+        true => choose_light(scene, r, word),
+        false if scene.lights.len() == 1 => ((0, word), 0.0),
+        false => (alias_choose(&scene.light_table, word), 0.0),
+    };
     let (mut light, p) = (scene.lights[chosen as usize], r.position);
+    if scene.light_tree && probability > 0.0 {
+        light.probability = probability;
+    }
     if scene.weighed_lights && light.is_point_or_spot() {
         light = choose_by_share(scene, r, u.x);
     }
-    let resampled = is_resampled(scene, &light);
-    let factor = if resampled { resample(scene, r, word, &mut light) } else { 1.0 };
     let mut sample = match light.kind {
         LIGHT_TRIANGLE | LIGHT_MIRRORED => sample_triangle_light(scene, &light, p, u),
         LIGHT_SPHERE => sample_sphere_light(&light, p, u),
@@ -395,20 +303,20 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         },
         _ => sample_environment(scene, &light, rest, u),
     };
-    if resampled {
-        sample.radiance *= factor;
-        sample.pdf *= boost(scene, light.probability);
+    if scene.light_tree && sample.pdf > 0.0 && light.has_surface() {
+        let density = scene.triangle_pdf_scale * scene.materials[light.material as usize].emission_weight;
+        sample.pdf = nominal_pdf(scene, density, light.probability / sample.pdf, p);
+    }
+    if scene.light_tree && probability == 0.0 {
+        sample.radiance = Vec3::ZERO;
     }
     sample
 }
 
-/// Density per solid angle with which [`light_sample`] chooses, from `origin`, a point of an emissive triangle or
-/// sphere hit by a ray.
-pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
+/// Density per solid angle with which [`light_sample`] would choose, from `origin`, a point of an emissive triangle or sphere that a ray
+/// hits, if lights were chosen by the table. `density` is that over area.
+fn table_pdf(scene: &Scene, density: f32, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
     let [a, e1, e2] = s.triangle;
-    let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
-    let area = if s.radius > 0.0 { 4.0 * PI * s.radius * s.radius } else { 0.5 * unit_vector(e1.cross(e2)).1 };
-    let density = density * boost(scene, density * area);
     if s.radius > 0.0 {
         let cap = sphere_cap(a - origin, s.radius);
         return if cap > 0.0 { density * 2.0 * s.radius * s.radius / cap } else { 0.0 };
@@ -418,4 +326,16 @@ pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosi
         true => density * 0.5 * unit_vector(e1.cross(e2)).1 / seen.solid_angle,
         false => density * t * t / cosine.max(1e-20),
     }
+}
+
+/// The same, however lights are chosen; with a tree the nominal one.
+pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
+    let [_, e1, e2] = s.triangle;
+    let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
+    let pdf = table_pdf(scene, density, s, origin, t, cosine);
+    if !scene.light_tree || pdf <= 0.0 {
+        return pdf;
+    }
+    let area = if s.radius > 0.0 { 4.0 * PI * s.radius * s.radius } else { 0.5 * unit_vector(e1.cross(e2)).1 };
+    nominal_pdf(scene, density, density * area / pdf, origin)
 }

@@ -12,6 +12,7 @@ pub mod gather;
 pub mod guide_lookup;
 pub mod light;
 pub mod light_change;
+pub mod light_tree;
 pub mod metallic;
 pub mod path;
 pub mod primary_hit;

@@ -123,7 +123,7 @@ fn scribble<T: bytemuck::Pod>(array: &mut Vec<T>, at: usize, value: u32, resize:
 /// One edit of what a caller may edit.
 fn edit(scene: &mut Loaded, part: u32, at: usize, value: u32, resize: bool) {
     let sky = scene.environment.get_or_insert_default();
-    match part % 19 {
+    match part % 20 {
         0..=2 => scribble(&mut scene.nodes, at, value, resize),
         3 => scribble(&mut scene.triangles, at, value, resize),
         4 => scribble(&mut scene.shading, at, value, resize),
@@ -148,6 +148,7 @@ fn edit(scene: &mut Loaded, part: u32, at: usize, value: u32, resize: bool) {
                 _ => scene.view.position = Some([number.into(), 1.0, 2.0]),
             }
         }
+        18 => scribble(&mut scene.light_nodes, at, value, resize),
         _ if resize => scene.names = Default::default(),
         _ => scene.settings.max_depth = value,
     }
@@ -425,6 +426,13 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
     refused("a light of no kind", &|s| s.lights[0].kind = 99);
     refused("an alias that is not there", &|s| s.light_table[0].alias = 1 << 20);
     refused("lights without a table", &|s| s.light_table.clear());
+    let tree = |s: &mut Loaded, power, child| {
+        (s.light_tree, s.light_nodes) = (true, vec![LightNode { power, child, ..LightNode::default() }; 9]);
+    };
+    refused("a tree of lights without a root", &|s| (s.light_tree, s.light_nodes) = (true, Vec::new()));
+    refused("a node of lights below itself", &|s| tree(s, 1.0, 4));
+    refused("nodes of lights beyond the end", &|s| tree(s, 1.0, 8));
+    refused("a light beyond the end", &|s| tree(s, 1.0, LIGHT_LEAF | 99));
     refused("a sky of another size", &|s| s.environment.as_mut().unwrap().width += 1);
     refused("a sky's alias", &|s| s.environment.as_mut().unwrap().table[0].alias = 99);
     refused("a sphere without a radius", &|s| (s.triangles[0].primitive, s.triangles[0].v1) = (SPHERE, [0.0; 3]));

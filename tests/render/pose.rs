@@ -30,6 +30,7 @@ fn handles(renderer: &Renderer) -> Vec<u64> {
         s.materials.raw().handle,
         s.lights.raw().handle,
         s.light_table.raw().handle,
+        s.light_nodes.raw().handle,
     ]
 }
 

@@ -3,9 +3,10 @@
 use crate::poses::{MOMENTS, Moment, at, pose};
 use bytemuck::{Pod, cast_slice};
 use glam::{DVec3, Vec3};
+use std::path::Path;
 use tallow::layout::{Instance, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT};
 use tallow::scene::description::Transform;
-use tallow::scene::{Pose, Scene, Vertices};
+use tallow::scene::{MaterialChange, Pose, Scene, Vertices};
 
 /// Bytes of all arrays that kernels read. Trees that were not built anew have another shape, and other nodes.
 fn arrays(scene: &Scene) -> Vec<(&'static str, Vec<u8>)> {
@@ -20,6 +21,7 @@ fn arrays(scene: &Scene) -> Vec<(&'static str, Vec<u8>)> {
         ("materials", bytes(&scene.materials)),
         ("lights", bytes(&scene.lights)),
         ("light_table", bytes(&scene.light_table)),
+        ("light_nodes", bytes(&scene.light_nodes)),
         ("scale", bytes(&[scene.triangle_pdf_scale])),
         ("bounds", bytes(scene.bounds.as_flattened())),
         ("camera", bytes(&[scene.camera([4, 3]).unwrap()])),
@@ -81,6 +83,33 @@ fn the_same_pose_again_changes_nothing() {
         assert!(again.is_of_camera_alone(), "{moment:?}: {again:?}");
         assert!(arrays(&scene) == before, "{moment:?}");
     }
+}
+
+#[test]
+fn a_tree_over_lamps_follows_them() {
+    let at = |x: f64, emission: f32| {
+        let text = format!(
+            "[[material]]\nname = 'lamp'\nemission = {emission}\n[[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 8\n\
+             material = 'lamp'\n[[instance]]\nname = 'one'\nmesh = 'ball'\ntransform = {{ translate = [{x:?}, 2.0, 0.0] }}\n\
+             [[instance]]\nmesh = 'ball'\ntransform = {{ translate = [-5.0, 2.0, 0.0] }}\n\
+             [environment]\nradiance = 0.1\n"
+        );
+        Scene::parse(Path::new("lamps.toml"), &text).unwrap().scene
+    };
+    let mut scene = at(0.0, 3.0);
+    assert!(scene.light_tree && scene.light_nodes.len() > scene.lights.len());
+    let to = |x: f64| Transform::from([1., 0., 0., x, 0., 1., 0., 2., 0., 0., 1., 0., 0., 0., 0., 1.]);
+    scene.apply(&Pose { instances: vec![(0, to(4.0))], ..Pose::default() }).unwrap();
+    assert_eq!(scene.light_nodes, at(4.0, 3.0).light_nodes);
+    assert_ne!(scene.light_nodes, at(0.0, 3.0).light_nodes, "control");
+    // The sky alone is left, and the tree has no light.
+    let dark = MaterialChange { emission: Some([0.0; 3]), ..MaterialChange::default() };
+    scene.apply(&Pose { materials: vec![(0, dark)], ..Pose::default() }).unwrap();
+    scene.check().unwrap();
+    assert_eq!(scene.light_nodes.iter().map(|n| n.power).collect::<Vec<_>>(), [0.0, 1.0]);
+    let lit = MaterialChange { emission: Some([3.0; 3]), ..MaterialChange::default() };
+    scene.apply(&Pose { materials: vec![(0, lit)], ..Pose::default() }).unwrap();
+    assert_eq!(scene.light_nodes, at(4.0, 3.0).light_nodes);
 }
 
 /// Checks that all corners below a node lie in the boxes of its children, which reach beyond them by two cells of their grid, and what

@@ -1,12 +1,16 @@
 //! Statistics of light sampling on its CPU twin: directions follow the densities by which MIS weighs the same light when a bounce
 //! finds it.
 use crate::statistics::{chi_square, sidak};
-use crate::twin::{Random, Workplace};
+use crate::twin::{Random, Workplace, many_lamps};
 use glam::{Mat3, Vec3, dvec3, vec3};
 use std::f64::consts::{PI, TAU};
-use tallow::layout::{LIGHT_ENVIRONMENT, Light, MATERIAL_EMITS_BEHIND, NONE};
+use tallow::layout::{LIGHT_ENVIRONMENT, LIGHT_LEAF, Light, MATERIAL_EMITS_BEHIND, NONE};
+use tallow::math::hash::{pcg, unit_interval};
 use tallow::scene::Loaded;
+use tallow::shaders::shared::light::EVEN_SHARE;
+use tallow::shaders::shared::light_tree::CHILDREN;
 use tallow::twins::light::*;
+use tallow::twins::light_tree::{brought_by, choose_by_tree};
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 use tallow::twins::scene::triangle_vertices;
 use tallow::twins::surface::surface_at;
@@ -128,7 +132,7 @@ fn many_lights() -> Loaded {
              [[light]]\ntype = 'spot'\nposition = [0.0, 3.0, 0.0]\ndirection = [0.0, -1.0, 0.0]\nintensity = 9.0\n\
              [[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.2]\nirradiance = 0.5\n";
     let mut scene = place.scene(&text);
-    (scene.resampled_lights, scene.weighed_lights) = (false, false);
+    (scene.light_tree, scene.weighed_lights) = (false, false);
     scene
 }
 
@@ -138,7 +142,7 @@ fn lights_that_are_dark_count_for_nothing() {
         let light =
             |intensity| format!("[[light]]\ntype = 'point'\nposition = [0.0, 1.0, 0.0]\nintensity = {intensity}\n");
         let scene = Workplace::new().scene(&(light(1).repeat(lit) + &light(0).repeat(dark)));
-        (scene.weighed_lights, scene.resampled_lights)
+        (scene.weighed_lights, scene.light_tree)
     };
     assert_eq!(
         [with(1, 0), with(1, 1), with(32, 0), with(32, 5)],
@@ -209,6 +213,94 @@ fn lights_are_drawn_with_their_probabilities() {
     assert!(p(&scene) > sidak(1));
     scene.light_table.iter_mut().for_each(|entry| entry.threshold -= entry.threshold / 20);
     assert!(p(&scene) < sidak(1), "control: thresholds that are 5 % off");
+}
+
+/// Probabilities of the lights of a tree: most of the choices go by what is brought all the way down, the others are even at every node.
+fn by_tree(scene: &Loaded, r: &Receiver) -> Vec<f64> {
+    let mut found = vec![0.0; scene.lights.len()];
+    let mut open = vec![(scene.light_nodes[0].child, 1.0, 1.0)];
+    while let Some((at, by_odds, even)) = open.pop() {
+        if at & LIGHT_LEAF != 0 {
+            let share = f64::from(EVEN_SHARE);
+            found[(at & !LIGHT_LEAF) as usize] = (1.0 - share) * by_odds + share * even;
+            continue;
+        }
+        let nodes = &scene.light_nodes[at as usize..(at + CHILDREN) as usize];
+        let brings: Vec<_> = nodes.iter().map(|node| f64::from(brought_by(scene, node, r))).collect();
+        let (sum, number) = (brings.iter().sum::<f64>(), brings.iter().filter(|b| **b > 0.0).count() as f64);
+        let lit = nodes.iter().zip(brings).filter(|(_, brings)| *brings > 0.0);
+        open.extend(lit.map(|(node, brings)| (node.child, by_odds * brings / sum, even / number)));
+    }
+    found
+}
+
+/// A floor, a pane of glass that has light behind it, and a point.
+fn receivers() -> [Receiver; 3] {
+    let floor =
+        Receiver { normal: Vec3::Y, lets_light_through: false, odds_beyond_cosine: 0.0, ..Receiver::point(HERE) };
+    [floor, Receiver { lets_light_through: true, ..floor }, Receiver::point(HERE)]
+}
+
+const WORDS: u32 = 1 << 18;
+
+/// Words, each in its own part of all.
+fn words() -> impl Iterator<Item = u32> {
+    (0..WORDS).map(|i| i << 14 | pcg(i) >> 18)
+}
+
+#[test]
+fn a_tree_draws_lights_with_their_probabilities() {
+    // Of a hundred thousand lamps each is drawn a few times alone, and steps down the tree use up the digits of a number.
+    let crowd: Vec<_> = (0..100_000).map(|i| corners(i, vec3(30.0, 1.0, 30.0))).collect();
+    let text = "[[material]]\nname = 'a'\nemission = 1.0\n[[mesh]]\nfile = 'crowd.obj'\nmaterial = 'a'\n";
+    let crowd = Workplace::new().obj("crowd.obj", &crowd).scene(text);
+    for (name, scene, alike) in [("few", many_lamps(40), 1), ("crowd", crowd, 256)] {
+        assert!(scene.light_tree, "{name}");
+        for r in receivers() {
+            let claimed = by_tree(&scene, &r);
+            let mut observed = vec![0.0; scene.lights.len().div_ceil(alike) + 1];
+            let mut expected = observed.clone();
+            claimed.iter().enumerate().for_each(|(i, p)| expected[i / alike] += p * f64::from(WORDS));
+            let whole = observed.len() - 1;
+            for word in words() {
+                let (light, p) = choose_by_tree(&scene, &r, unit_interval(word), pcg(word));
+                let expected = if p > 0.0 { claimed[light as usize] } else { 0.0 };
+                assert!(
+                    (f64::from(p) - expected).abs() <= 1e-4 * expected,
+                    "{name}: {p} of light {light} is {expected}"
+                );
+                observed[if p > 0.0 { light as usize / alike } else { whole }] += 1.0;
+            }
+            expected[whole] = (f64::from(WORDS) - expected.iter().sum::<f64>()).max(0.0);
+            // Words are spread evenly, so that numbers of draws differ less from what is expected than by chance.
+            let p = chi_square(&observed, &expected);
+            assert!(p > sidak(6), "{name}, {r:?}: {p:.1e}");
+            let planted: Vec<f64> = observed.iter().zip(0..).map(|(o, i)| o * (0.9 + 0.2 * f64::from(i % 2))).collect();
+            assert!(
+                chi_square(&planted, &expected) < sidak(6),
+                "{name}: the test cannot see a choice that is 10 % off"
+            );
+        }
+    }
+}
+
+fn corners(i: u32, size: Vec3) -> [Vec3; 3] {
+    let mut random = Random::stream(i as usize);
+    let middle = size * random.point() + 2.0 * Vec3::Y;
+    [0; 3].map(|_| middle + 0.02 * random.point())
+}
+
+#[test]
+fn trees_pass_over_lights_behind_a_surface_and_not_behind_glass() {
+    let scene = many_lamps(0);
+    let highest = scene.lights.iter().flat_map(|l| [l.a, l.b, l.c]).map(|p| p[1]).fold(0.0, f32::max);
+    let above = Receiver { position: vec3(0.3, highest + 1.0, 0.2), ..receivers()[0] };
+    let chance = |r: &Receiver| by_tree(&scene, r).iter().sum::<f64>();
+    assert_eq!(chance(&above), 0.0);
+    assert_eq!(choose_by_tree(&scene, &above, 0.5, 1).1, 0.0);
+    assert!(chance(&Receiver { lets_light_through: true, ..above }) > 0.9, "glass");
+    assert!(chance(&Receiver { normal: -Vec3::Y, ..above }) > 0.9, "control: turned round");
+    assert_eq!(light_sample(&scene, &above, 1 << 20, glam::Vec2::splat(0.5)).radiance, Vec3::ZERO);
 }
 
 /// Share of samples of `scene` whose density and light are not what `claimed` says of their directions.

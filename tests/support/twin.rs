@@ -104,16 +104,32 @@ pub fn instanced_ball() -> Loaded {
 
 /// A room under a panel that is as wide as its ceiling.
 pub fn under_a_panel() -> Loaded {
-    Workplace::new().scene(
+    room_under(Workplace::new(), "shape = 'rectangle'")
+}
+
+/// The same under one of 50 triangles.
+pub fn under_many_panels() -> Loaded {
+    let corner = |i: usize| vec3((i % 6) as f32 * 0.4 - 1.0, (i / 6) as f32 * 0.4 - 1.0, 0.0);
+    let square = |i: usize| {
+        let at = i / 5 * 6 + i % 5;
+        let [a, b, c, d] = [at, at + 1, at + 7, at + 6].map(corner);
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles: Vec<_> = (0..25).flat_map(square).collect();
+    room_under(Workplace::new().obj("panels.obj", &triangles), "file = 'panels.obj'")
+}
+
+fn room_under(place: Workplace, panel: &str) -> Loaded {
+    place.scene(&format!(
         "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.2, -0.4, 0.9]\ntarget = [0.0, 0.3, -1.0]\nfov = 80.0\n\
          [render]\nmax_depth = 3\n[[material]]\nname = 'wall'\ncolor = 0.5\n\
          [[material]]\nname = 'metal'\ntype = 'conductor'\nmetal = 'Al'\nalpha = 0.2\n\
          [[material]]\nname = 'lamp'\nemission = [4.0, 5.0, 6.0]\n\
          [[mesh]]\nshape = 'cube'\nflip_normals = true\nmaterial = 'wall'\n\
-         [[mesh]]\nshape = 'sphere'\nmaterial = 'metal'\ntransform = { translate = [0.3, 0.3, -0.4], scale = 0.4 }\n\
-         [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
-         transform = { translate = [0.0, 0.8, 0.0], rotate = [90.0, 0.0, 0.0], scale = 0.9 }\n",
-    )
+         [[mesh]]\nshape = 'sphere'\nmaterial = 'metal'\ntransform = {{ translate = [0.3, 0.3, -0.4], scale = 0.4 }}\n\
+         [[mesh]]\n{panel}\nmaterial = 'lamp'\n\
+         transform = {{ translate = [0.0, 0.8, 0.0], rotate = [90.0, 0.0, 0.0], scale = 0.9 }}\n",
+    ))
 }
 
 /// A ray towards a point where triangles meet, `distance` away.

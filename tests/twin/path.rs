@@ -3,7 +3,7 @@
 use crate::twin::*;
 use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
-use tallow::layout::{Light, NONE};
+use tallow::layout::{Light, Material, NONE};
 use tallow::scene::description::Transform;
 use tallow::scene::{Loaded, Pose};
 use tallow::twins::light::{Receiver, light_sample};
@@ -377,9 +377,9 @@ fn large_lamps_are_sampled_by_solid_angle() {
 fn many_lamps_are_chosen_by_what_they_bring() {
     for points in [0, 3, 40] {
         let scene = many_lamps(points);
-        assert!(scene.resampled_lights && scene.weighed_lights == (points == 3));
+        assert!(scene.light_tree && scene.weighed_lights == (points == 3));
         let mut by_power = scene.clone();
-        by_power.resampled_lights = false;
+        by_power.light_tree = false;
         let strategies =
             if points == 0 { &[Strategy::Both, Strategy::Light, Strategy::Bsdf][..] } else { &[Strategy::Both] };
         let expected = mean(&by_power, Strategy::Both, 1024);
@@ -389,13 +389,10 @@ fn many_lamps_are_chosen_by_what_they_bring() {
         }
         let [chosen, by_power] = [&scene, &by_power].map(|scene| mean(scene, Strategy::Light, 256).error);
         assert!(chosen < 0.75 * by_power, "{points}: {chosen} of {by_power}");
-        let mut wrong = scene;
-        wrong.lights.iter_mut().for_each(|light| light.probability *= 1.1);
-        let found = mean(&wrong, Strategy::Light, 256);
-        assert!(
-            !found.agrees(&expected),
-            "control, {points}: {found:?} by other probabilities than the table's, {expected:?}"
-        );
+        let mut tight = scene.clone();
+        tight.light_nodes.iter_mut().for_each(|node| (node.radius, node.beams) = (0.0, 0x7fff_7fff));
+        let found = mean(&tight, Strategy::Light, 256);
+        assert!(!found.agrees(&expected), "control, {points}: {found:?} with bounds that are too small, {expected:?}");
     }
 }
 
@@ -418,10 +415,28 @@ fn beside_a_sign(sign: &str) -> Loaded {
 #[test]
 fn dim_masks_of_one_lamp_take_no_samples_from_others() {
     let [masked, dim] = ["emission = 4.0\nopacity = 0.004", "emission = 0.016"].map(beside_a_sign);
-    assert!(masked.resampled_lights && dim.resampled_lights);
+    assert!(masked.light_tree && dim.light_tree);
     let [a, b] = [&masked, &dim].map(|scene| mean(scene, Strategy::Light, 256));
     assert!(a.agrees(&b), "{a:?} {b:?}");
     assert!(a.error < 1.3 * b.error, "{a:?} {b:?}");
+}
+
+#[test]
+fn a_lamp_of_many_triangles_shines_alike_however_it_is_found() {
+    let scene = under_many_panels();
+    assert!(scene.light_tree && !scene.large_lamps);
+    let [both, light, bsdf] = [Strategy::Both, Strategy::Light, Strategy::Bsdf].map(|s| mean(&scene, s, 256));
+    assert!(both.agrees(&light) && both.agrees(&bsdf), "{both:?} {light:?} {bsdf:?}");
+    let whole = mean(&under_a_panel(), Strategy::Both, 256);
+    assert!(both.agrees(&whole), "{both:?} of one panel {whole:?}");
+    // Control: one density where a light is chosen, another where it is met.
+    let mut other = scene;
+    let dimmer = other.materials.iter().map(|m| Material { emission_weight: 0.1 * m.emission_weight, ..*m });
+    let first = other.materials.len() as u32;
+    other.materials = other.materials.iter().copied().chain(dimmer).collect();
+    other.lights.iter_mut().for_each(|light| light.material += first);
+    let wrong = mean(&other, Strategy::Both, 256);
+    assert!(!wrong.agrees(&whole), "control: {wrong:?} {whole:?}");
 }
 
 /// Share of samples of a lamp whose light is not what a ray in their direction meets.

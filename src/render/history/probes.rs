@@ -39,7 +39,7 @@ impl Probes {
         let (thread, traverse, deal) =
             (gpu.tuning().thread(), gpu.tuning().traverse(stack), deal::Constants::default());
         // A change of one light must not change which of the others are chosen.
-        let effects = Effects { resampled_lights: false, ..effects };
+        let effects = Effects { light_tree: false, ..effects };
         let cells = size.map(|n| n.div_ceil(PROBE_CELL));
         let count = (cells[0] * cells[1]) as usize;
         let changes = || Buffer::new(gpu, "changes of light", count, Location::Device);

@@ -10,6 +10,7 @@ pub mod environment;
 pub mod fresnel;
 pub mod geometry;
 pub mod hierarchy;
+pub mod light_tree;
 pub mod lights;
 pub mod plan;
 pub mod soft;

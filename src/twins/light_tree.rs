@@ -1,0 +1,157 @@
+//! Twin of `glsl/shared/light_tree.glsl`.
+use crate::layout::{LIGHT_LEAF, LIGHT_SPOT, Light, LightNode};
+use crate::math::hash::{pcg, unit_interval};
+use crate::math::octahedral::{octahedral_decode, snorms};
+use crate::scene::Scene;
+use crate::shaders::shared::light::{BELOW_ONE, EVEN_SHARE, MAX_ODDS};
+use crate::shaders::shared::light_tree::{CHILDREN, COSINE_SLACK, LEAST_COSINES, UNIT_STEP};
+use glam::Vec3;
+
+/// What light is sampled for.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// World units.
+    pub position: Vec3,
+    /// Unit normal of the lobes, on the viewer's side.
+    pub normal: Vec3,
+    /// Whether light from the other side counts, too.
+    pub lets_light_through: bool,
+    /// Added to the cosine in the odds of a light, for lobes that reflect more than the cosine says.
+    pub odds_beyond_cosine: f32,
+}
+
+impl Receiver {
+    /// A point that light from everywhere reaches alike.
+    pub fn point(position: Vec3) -> Self {
+        Self { position, normal: Vec3::ZERO, lets_light_through: true, odds_beyond_cosine: 1.0 }
+    }
+}
+
+/// Share of a spot's intensity along `w`, from the point that it lights.
+pub fn spot_share(light: &Light, w: Vec3) -> f32 {
+    let axis = Vec3::from(light.b);
+    let angle = axis.cross(w).length().atan2(-axis.dot(w));
+    let [full, cut, _] = light.c;
+    ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0)
+}
+
+fn mean_cosine(cosine: f32, m: f32, share: f32) -> f32 {
+    let (along, across) = (m * cosine, (0.6 * (1.0 - m)).min(0.25));
+    let spread = across + ((0.25 - 0.5 * m).max(0.0) - across) * cosine * cosine;
+    0.5 * (along + (along * along + share * spread).sqrt())
+}
+
+/// About what the lights below a node bring to a receiver, up to a factor that all nodes have; 0 only if they bring nothing.
+pub fn brought_by(scene: &Scene, node: &LightNode, r: &Receiver) -> f32 {
+    let (to_node, axis) = (Vec3::from(node.centre) - r.position, octahedral_decode(node.axis));
+    let centre2 = to_node.length_squared();
+    let inverse = 1.0 / centre2.max(1e-30).sqrt();
+    let (w, within) = (to_node * inverse, (node.radius * inverse).min(1e15));
+    let (seen, slack) = ((1.0 - within * within).max(0.0).sqrt(), COSINE_SLACK * (1.0 + within));
+    let towards = if within < 1.0 { 0.5 + 0.5 * seen } else { 0.5 / within };
+    let (cosine, beam, tilt) = (r.normal.dot(w), -axis.dot(w), r.normal.dot(axis));
+    let [edge, mean] = snorms(node.beams);
+    let in_a_plane = mean < 0.0;
+    let both_sides = in_a_plane && edge < -0.5;
+    let share = if in_a_plane { (1.0 - tilt * tilt).max(0.0) } else { 1.0 };
+    let behind = if r.lets_light_through { mean_cosine(-cosine, towards, share) } else { 0.0 };
+    let arrives = mean_cosine(cosine, towards, share) + behind;
+    let faced = r.lets_light_through || cosine > -within * share.sqrt() - slack;
+    let nearest = if beam >= seen { 1.0 } else { beam * seen + (1.0 - beam * beam).max(0.0).sqrt() * within };
+    let lit = both_sides || if in_a_plane { beam > -slack } else { within >= 1.0 || nearest > edge - slack };
+    let m = if in_a_plane { 1.0 } else { mean } * towards;
+    let front = mean_cosine(beam, m, 1.0);
+    let emits = if both_sides { 0.5 * (front + mean_cosine(-beam, m, 1.0)) } else { front };
+    let leaf = (node.child & LIGHT_LEAF != 0).then(|| &scene.lights[(node.child & !LIGHT_LEAF) as usize]);
+    let emits = leaf.filter(|light| light.kind == LIGHT_SPOT).map_or(emits, |light| emits * spot_share(light, w));
+    let brings = (emits * (arrives + r.odds_beyond_cosine)).max(LEAST_COSINES) * node.power;
+    let d2 = centre2.max(0.25 * node.radius * node.radius).max(1e-30);
+    if faced && lit { (brings / d2).min(MAX_ODDS) } else { 0.0 }
+}
+
+/// The light that `u` chooses, and the probability of the choice, which is 0 if no light brings anything.
+pub fn choose_by_tree(scene: &Scene, r: &Receiver, mut u: f32, mut bits: u32) -> (u32, f32) {
+    let mut at = scene.light_nodes[0].child;
+    let (mut probability, mut by_odds) = (1.0, 1.0 - EVEN_SHARE);
+    loop {
+        let nodes = &scene.light_nodes[at as usize..(at + CHILDREN) as usize];
+        let brings: Vec<f32> = nodes.iter().map(|node| brought_by(scene, node, r)).collect();
+        let sum: f32 = brings.iter().sum();
+        let number = brings.iter().filter(|b| **b > 0.0).count() as f32;
+        let (mut before, mut start, mut share, mut odds_here) = (0.0, 0.0, 0.0, 0.0);
+        for (node, brings) in nodes.iter().zip(brings).filter(|(_, brings)| *brings > 0.0) {
+            let odds = brings / sum;
+            let part = 1.0 / number * (1.0 - by_odds) + odds * by_odds;
+            if u >= before {
+                (at, start, share, odds_here) = (node.child, before, part, odds);
+            }
+            before += part;
+        }
+        if share == 0.0 {
+            return (0, 0.0);
+        }
+        probability *= share;
+        if at & LIGHT_LEAF != 0 {
+            return (at & !LIGHT_LEAF, probability);
+        }
+        by_odds = (by_odds * odds_here / share).min(1.0);
+        u = ((u - start + UNIT_STEP * unit_interval(bits)) / share).min(BELOW_ONE);
+        bits = pcg(bits);
+    }
+}
+
+/// The light that `word` chooses with what is left of that word, and the probability of the choice if it is of the tree; 0 if no light can
+/// bring anything.
+pub fn choose_light(scene: &Scene, r: &Receiver, word: u32) -> ((u32, u32), f32) {
+    let (u, hash, root) = (unit_interval(word), pcg(word), &scene.light_nodes[0]);
+    let mut before = root.power;
+    if u < before {
+        let (light, probability) = choose_by_tree(scene, r, (u / before).min(BELOW_ONE), hash);
+        return ((light, word), before * probability);
+    }
+    let mut chosen = ((0, word), 0.0);
+    for outside in &scene.light_nodes[1..root.child as usize] {
+        if outside.power > 0.0 && u >= before {
+            let within = ((u - before) / outside.power).min(BELOW_ONE);
+            let rest = ((within * 16777216.0) as u32) << 8 | hash & 0xff;
+            chosen = ((outside.child & !LIGHT_LEAF, rest), outside.power);
+        }
+        before += outside.power;
+    }
+    chosen
+}
+
+/// The density per solid angle that MIS takes for a point of a lamp of the tree, which is seen under `solid_angle` from `p` and has this
+/// `density` over area by the table.
+pub fn nominal_pdf(scene: &Scene, density: f32, solid_angle: f32, p: Vec3) -> f32 {
+    let all = &scene.light_nodes[0];
+    let to_all = Vec3::from(all.centre) - p;
+    let others = 0.5 * all.power / to_all.length_squared().max(all.radius * all.radius).max(1e-30);
+    all.power * density / (density * solid_angle + others).max(1e-37)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_cosines_are_those_of_caps() {
+        for c in [-1.0, -0.6, 0.0, 0.3, 1.0f32] {
+            // One direction, a hemisphere and all directions.
+            for (m, exact) in [(1.0, c.max(0.0)), (0.5, 0.25 + 0.25 * c), (0.0, 0.25)] {
+                assert!((mean_cosine(c, m, 1.0) - exact).abs() < 1e-6, "{m}, {c}");
+            }
+            // A cap down to the cosine 0.2, whose mean has length 0.6, by quadrature.
+            let (mut sum, n) = (0.0, 400u16);
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                let [u, v] = [i, j].map(|i| (f32::from(i) + 0.5) / f32::from(n));
+                let z = 1.0 - 0.8 * u;
+                let x = (1.0 - z * z).sqrt() * (2.0 * std::f32::consts::PI * v).cos();
+                sum += f64::from((z * c + x * (1.0 - c * c).sqrt()).max(0.0));
+            }
+            let exact = sum / f64::from(n).powi(2);
+            assert!((f64::from(mean_cosine(c, 0.6, 1.0)) - exact).abs() < 0.03, "{c}: {exact}");
+            assert!(c < 0.0 || (f64::from(mean_cosine(c, 0.4, 1.0)) - exact).abs() > 0.003, "control, {c}");
+        }
+    }
+}
