@@ -18,6 +18,7 @@ use std::sync::Arc;
 
 pub mod animation;
 mod apply;
+pub(crate) mod attributes;
 mod build;
 mod change;
 mod check;
@@ -25,6 +26,7 @@ pub mod description;
 mod effects;
 mod fingerprint;
 mod load;
+pub(crate) mod lookup;
 mod numbers;
 mod pose;
 mod relit;

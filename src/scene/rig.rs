@@ -39,7 +39,7 @@ pub struct Rig {
     pub(in crate::scene) sky: f64,
     /// [`Material::emission_weight`] is counted in 2 to the power of minus this.
     pub(in crate::scene) dimness: i32,
-    /// Mean colours of pictures that emit or mask, by first texel and transfer curve.
+    /// Mean colours of pictures that emit or mask, by `texture::mean_key`.
     pub(in crate::scene) means: HashMap<(u32, u32), [f32; 3]>,
     /// Materials that have a table of their coat.
     pub(in crate::scene) tabled: HashSet<u32>,

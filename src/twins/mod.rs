@@ -4,7 +4,6 @@
 #![allow(clippy::excessive_precision, clippy::approx_constant, reason = "constants as the GLSL writes them")]
 pub mod accumulate;
 pub mod apportion;
-pub mod attributes;
 pub mod bsdf;
 pub mod camera;
 pub mod coat;

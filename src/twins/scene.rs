@@ -1,7 +1,7 @@
 //! Twin of `glsl/shared/scene.glsl`: typed access to the scene's arrays.
-use crate::layout::{Instance, NONE, TEXTURE_SECOND_UV};
+use crate::layout::{Instance, NONE};
 use crate::scene::Scene;
-use crate::twins::attributes::Attributes;
+use crate::scene::lookup::triangle_coordinates;
 use crate::twins::sphere::Sphere;
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
@@ -56,18 +56,10 @@ pub fn material_of(scene: &Scene, triangle: u32, instance: u32) -> u32 {
     }
 }
 
-/// Whether a picture is read at the second set of coordinates.
-pub fn reads_second(scene: &Scene, image: u32) -> bool {
-    scene.textures[image as usize].flags & TEXTURE_SECOND_UV != 0
-}
-
 /// Coordinates at which a point reads a picture; `barycentric` weighs vertices 1 and 2.
 pub fn texture_coordinates(scene: &Scene, image: u32, triangle: u32, barycentric: Vec2) -> Vec2 {
     if let Some(sphere) = Sphere::of(scene, triangle) {
         return sphere.coordinates_of_hit(barycentric);
     }
-    let s = &scene.shading[triangle as usize];
-    let second = Attributes::of(scene, s).second_coordinates().filter(|_| reads_second(scene, image));
-    let [uv0, uv1, uv2] = second.unwrap_or([s.uv0, s.uv1, s.uv2].map(Vec2::from));
-    uv0 + barycentric.x * (uv1 - uv0) + barycentric.y * (uv2 - uv0)
+    triangle_coordinates(scene, image, triangle, barycentric)
 }

@@ -5,11 +5,12 @@ use crate::layout::{
 use crate::math::octahedral::{octahedral_decode, octahedral_vector};
 use crate::math::warp::basis_from_normal;
 use crate::scene::Scene;
+use crate::scene::attributes::Attributes;
+use crate::scene::lookup::reads_second;
 use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
-use crate::twins::attributes::Attributes;
 use crate::twins::bsdf::{Bsdf, bsdf_is_specular};
 use crate::twins::metallic::{Metallic, Parameters};
-use crate::twins::scene::{material_of, object_from_world, reads_second, triangle_vertices, world_from_object};
+use crate::twins::scene::{material_of, object_from_world, triangle_vertices, world_from_object};
 use crate::twins::sphere::Sphere;
 use crate::twins::texture::texture_sample;
 use crate::twins::traverse::Hit;

@@ -1,77 +1,13 @@
 //! Twin of `glsl/shared/texture.glsl`.
-use crate::layout::{
-    MATERIAL_CLEAR_WALL, MATERIAL_MASKED, Material, NONE, SPHERE, TEXTURE_CLAMP, TEXTURE_CLAMP_U, TEXTURE_CLAMP_V,
-    TEXTURE_FLOAT, TEXTURE_MIRROR_U, TEXTURE_MIRROR_V, TEXTURE_NEAREST, TEXTURE_RGB9E5, TEXTURE_SHEARED, TEXTURE_SRGB,
-    Texture,
-};
+use crate::layout::{MATERIAL_CLEAR_WALL, MATERIAL_MASKED, Material, NONE, SPHERE};
 use crate::math::hash::{pcg, unit_interval};
 use crate::math::octahedral::octahedral_vector;
-use crate::math::rgb9e5;
-use crate::math::srgb::linear_from_srgb;
 use crate::scene::Scene;
+use crate::scene::attributes::Attributes;
+pub use crate::scene::lookup::texture_sample;
 use crate::shaders::shared::segment::PASSES_WALLS;
-use crate::twins::attributes::Attributes;
 use crate::twins::scene::{material_of, object_from_world, texture_coordinates, world_from_object};
-use glam::{IVec2, Vec2, Vec2Swizzles, Vec3, Vec4, ivec2, vec2};
-
-/// One coordinate brought into `0..edge`, at most one period away.
-fn into_range(at: i32, edge: i32, clamp: bool) -> i32 {
-    match at {
-        at if clamp => at.clamp(0, edge - 1),
-        at if at < 0 => at + edge,
-        at if at >= edge => at - edge,
-        at => at,
-    }
-}
-
-/// Along u and v: whether the picture is clamped, and whether it is mirrored.
-fn modes(image: &Texture) -> [[bool; 2]; 2] {
-    let has = |bits: u32| image.flags & bits != 0;
-    let clamped = [has(TEXTURE_CLAMP | TEXTURE_CLAMP_U), has(TEXTURE_CLAMP | TEXTURE_CLAMP_V)];
-    [clamped, [has(TEXTURE_MIRROR_U), has(TEXTURE_MIRROR_V)]]
-}
-
-/// A coordinate brought into [0, 1].
-fn wrapped(x: f32, clamped: bool, mirrored: bool) -> f32 {
-    match x {
-        x if mirrored => 1.0 - (x.rem_euclid(2.0) - 1.0).abs(),
-        x if clamped => x.clamp(0.0, 1.0),
-        x => x - x.floor(),
-    }
-}
-
-fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
-    let edge = ivec2(image.width as i32, image.height as i32);
-    let [clamped, mirrored] = modes(image);
-    let [x, y] = [0, 1].map(|i| into_range(at[i], edge[i], clamped[i] || mirrored[i]));
-    let word = scene.texels[image.first as usize + (y * edge.x + x) as usize];
-    if image.flags & TEXTURE_FLOAT != 0 {
-        return Vec4::splat(f32::from_bits(word));
-    }
-    if image.flags & TEXTURE_RGB9E5 != 0 {
-        return Vec3::from(rgb9e5::unpack(word)).extend(1.0);
-    }
-    let bytes = word.to_le_bytes();
-    let c = Vec4::from(bytes.map(|b| f32::from(b) / 255.0));
-    if image.flags & TEXTURE_SRGB != 0 { c.truncate().map(linear_from_srgb).extend(c.w) } else { c }
-}
-
-/// Texture value at `uv`, interpolated bilinearly.
-pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
-    let image = &scene.textures[index as usize];
-    let turned = if image.flags & TEXTURE_SHEARED != 0 { uv.yx() * Vec2::from(image.shear) } else { Vec2::ZERO };
-    let uv = uv * Vec2::from(image.scale) + Vec2::from(image.offset) + turned;
-    let [clamped, mirrored] = modes(image);
-    let [x, y] = [0, 1].map(|i| wrapped(uv[i], clamped[i], mirrored[i]));
-    let at = vec2(x, 1.0 - y) * vec2(image.width as f32, image.height as f32) - 0.5;
-    let at = if image.flags & TEXTURE_NEAREST != 0 { (at + 0.5).floor() } else { at };
-    let corner = at.floor().as_ivec2();
-    let f = at - corner.as_vec2();
-    let texel = |dx, dy| texture_texel(scene, image, corner + ivec2(dx, dy));
-    let top = texel(0, 0).lerp(texel(1, 0), f.x);
-    let low = texel(0, 1).lerp(texel(1, 1), f.x);
-    top.lerp(low, f.y)
-}
+use glam::{Vec2, Vec3, Vec4};
 
 /// Opacity of a surface at a point of a triangle: the share of rays that it stops.
 pub fn surface_opacity(scene: &Scene, material: u32, triangle: u32, barycentric: Vec2) -> f32 {

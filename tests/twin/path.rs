@@ -3,6 +3,7 @@
 use crate::twin::*;
 use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
+use std::fmt::Write;
 use tallow::layout::{Light, Material, NONE};
 use tallow::scene::description::Transform;
 use tallow::scene::{Loaded, Pose};
@@ -419,6 +420,42 @@ fn dim_masks_of_one_lamp_take_no_samples_from_others() {
     let [a, b] = [&masked, &dim].map(|scene| mean(scene, Strategy::Light, 256));
     assert!(a.agrees(&b), "{a:?} {b:?}");
     assert!(a.error < 1.3 * b.error, "{a:?} {b:?}");
+}
+
+/// A floor before a wall of 8 by 8 squares, of whose picture one is lit, the third from below in the second column.
+fn before_windows(material: &str) -> Loaded {
+    let mut wall = String::new();
+    for (x, y) in (0..9u8).flat_map(|y| (0..9u8).map(move |x| (f32::from(x), f32::from(y)))) {
+        writeln!(wall, "v {} {y} 0\nvt {} {}", x - 4.0, x / 8.0, y / 8.0).unwrap();
+    }
+    for (x, y) in (0..8).flat_map(|y| (0..8).map(move |x| (x, y))) {
+        let a = 9 * y + x + 1;
+        let corners = [a, a + 1, a + 10, a + 9].map(|i| format!("{i}/{i}"));
+        writeln!(wall, "usemtl {}\nf {}", if (x, y) == (1, 2) { "lit" } else { "wall" }, corners.join(" ")).unwrap();
+    }
+    let text = format!(
+        "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.0, 3.0, 8.0]\ntarget = [0.0, 0.0, 3.0]\nfov = 30.0\n\
+         [render]\nmax_depth = 2\n{material}\n[[mesh]]\nfile = 'wall.obj'\n\
+         [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 8.0 }}\n"
+    );
+    let lit = |x: u32, y: u32| [if (8..16).contains(&x) && (40..48).contains(&y) { 255 } else { 0 }; 3];
+    Workplace::new().file("wall.obj", &wall).picture("windows.png", 64, lit).scene(&text)
+}
+
+/// Where emission is a picture, triangles that it leaves dark take few samples from those that it lights.
+#[test]
+fn of_a_wall_of_windows_those_are_chosen_that_are_lit() {
+    let emits = "color = 0.0\nemission = 9.0";
+    let picture = |name: &str| format!("[[material]]\nname = '{name}'\n{emits}\nemission_texture = 'windows.png'\n");
+    let windows = before_windows(&format!("{}{}", picture("lit"), picture("wall")));
+    let one =
+        before_windows(&format!("[[material]]\nname = 'lit'\n{emits}\n[[material]]\nname = 'wall'\ncolor = 0.0\n"));
+    assert!(windows.light_tree && windows.lights.len() == 128 && one.lights.len() == 2);
+    for strategy in [Strategy::Light, Strategy::Both] {
+        let [a, b] = [&windows, &one].map(|scene| mean(scene, strategy, 256));
+        // Interpolation lets the lit square shine a little beyond its edge, which is seldom chosen.
+        assert!((a.mean / b.mean - 1.0).abs() < 0.05 && a.error < 10.0 * b.error, "{a:?} {b:?}");
+    }
 }
 
 #[test]

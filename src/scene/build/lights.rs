@@ -5,6 +5,7 @@
 //! Power, by luminance, in watts up to a common factor: emissive triangle or sphere `pi * area * L` (L the mean over its texture
 //! times the mean opacity, twice that where both sides shine), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
 //! `pi R^2 E`, environment `4 pi^2 R^2` times its mean, R the radius of the scene.
+use super::brightness::brightness;
 use super::environment::mean_luminance;
 use super::light_tree::{self, Lamp};
 use super::{alias, geometry};
@@ -16,6 +17,7 @@ use crate::scene::Scene;
 use crate::scene::load::texture;
 use crate::scene::rig::Tree;
 use glam::{Mat4, Vec3, Vec4};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
@@ -46,9 +48,7 @@ pub fn weigh(scene: &mut Scene) {
     let (textures, texels, means) = (&scene.textures, &scene.texels, &mut scene.rig.means);
     // Many materials may share a picture.
     let mut mean = |image: u32| match textures.get(image as usize) {
-        Some(t) => *means
-            .entry((t.first, t.flags & (TEXTURE_SRGB | TEXTURE_RGB9E5 | TEXTURE_FLOAT)))
-            .or_insert_with(|| texture::mean(t, texels)),
+        Some(t) => *means.entry(texture::mean_key(t)).or_insert_with(|| texture::mean(t, texels)),
         None => [1.0; 3],
     };
     for m in &mut scene.materials {
@@ -119,12 +119,9 @@ fn tree(scene: &Scene) -> Vec<LightNode> {
         return Vec::new();
     }
     let (mut lamps, mut outside, mut probability) = (Vec::new(), Vec::new(), 0.0);
-    for (index, light) in (0..).zip(&scene.lights) {
+    let powers: Vec<f64> = scene.lights.par_iter().map(|light| power_in_tree(scene, light)).collect();
+    for ((index, light), power) in (0..).zip(&scene.lights).zip(powers) {
         if is_in_tree(scene, light) {
-            let power = match light.kind {
-                LIGHT_SPOT => 4.0 * PI * f64::from(luminance(light.value)), // the tree knows where spots shine
-                _ => power(scene, light),
-            };
             lamps.push(Lamp::new(index, light, power, is_two_sided(scene, light)));
             probability += f64::from(light.probability);
         } else {
@@ -327,5 +324,14 @@ fn power(scene: &Scene, light: &Light) -> f64 {
         LIGHT_DIRECTIONAL => PI * radius * radius * value,
         LIGHT_ENVIRONMENT => 4.0 * PI * PI * radius * radius * value * scene.rig.sky,
         _ => 0.0,
+    }
+}
+
+/// Power of a light of the tree, which knows where spots shine and how bright each triangle is.
+fn power_in_tree(scene: &Scene, light: &Light) -> f64 {
+    match light.kind {
+        LIGHT_SPOT => 4.0 * PI * f64::from(luminance(light.value)),
+        LIGHT_TRIANGLE | LIGHT_MIRRORED => power(scene, light) * brightness(scene, light),
+        _ => power(scene, light),
     }
 }

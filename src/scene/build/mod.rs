@@ -3,6 +3,7 @@ pub mod alias;
 pub mod assemble;
 pub mod attributes;
 pub mod bake;
+pub mod brightness;
 pub mod bvh;
 pub mod coat;
 pub mod encode;

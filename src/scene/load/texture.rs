@@ -244,6 +244,11 @@ fn check_size(width: u32, height: u32) -> std::result::Result<(), String> {
     }
 }
 
+/// What tells the mean of one picture from that of others.
+pub fn mean_key(texture: &Texture) -> (u32, u32) {
+    (texture.first, texture.flags & (TEXTURE_SRGB | TEXTURE_RGB9E5 | TEXTURE_FLOAT))
+}
+
 /// Mean linear colour of a picture.
 pub fn mean(texture: &Texture, texels: &[u32]) -> [f32; 3] {
     let count = texture.width as usize * texture.height as usize;
