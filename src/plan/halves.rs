@@ -9,40 +9,30 @@ pub type Pixels = [[f32; 3]];
 const REACH: usize = 2;
 
 /// What squared errors are divided by: the square of the radiance, plus relMSE's constant. The radiance is the mean of both images, moved
-/// towards that of 5 x 5 pixels around by the share that noise has in what the two differ by (James and Stein 1961): unmoved, a bright
-/// outlier would divide its own error, and moved wholly, a dark pixel beside a lamp would count for nothing.
+/// towards that of the 5 x 5 pixels around by the share that noise has in the variance among these (Lee 1980): unmoved, a bright outlier
+/// would divide its own error, and moved wholly, a dark pixel beside a lamp would count for nothing. In a picture of small
+/// lamps out of focus, 4 to 32 samples tell 0.8 to 1.1 of the true error.
 pub fn scales(width: usize, [a, b]: [&Pixels; 2]) -> Vec<[f64; 3]> {
     let height = a.len() / width.max(1);
-    let mean = |i: usize, c: usize| 0.5 * (f64::from(a[i][c]) + f64::from(b[i][c]));
     let scale = |i: usize| {
         let (x, y) = (i % width, i / width);
         let columns = x.saturating_sub(REACH)..(x + REACH + 1).min(width);
         let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
         let count = (columns.len() * rows.len()) as f64;
-        let around = |c: usize| {
-            let sum: f64 =
-                rows.clone().flat_map(|row| columns.clone().map(move |x| row * width + x)).map(|j| mean(j, c)).sum();
-            sum / count
-        };
+        let around = || rows.clone().flat_map(|row| columns.clone().map(move |x| row * width + x));
         [0, 1, 2].map(|c| {
-            let variance = (f64::from(a[i][c]) - f64::from(b[i][c])).powi(2) / 4.0;
-            let (own, around) = (mean(i, c), around(c));
-            let off = around - own;
-            let share = variance / (variance + off * off + f64::MIN_POSITIVE);
-            (own + share * off).powi(2) + RELMSE_EPSILON
+            let halves = |j: usize| [a, b].map(|image| f64::from(image[j][c]));
+            let [mean, square, noise] = around().map(halves).fold([0.0; 3], |sum, [a, b]| {
+                let (mean, off) = (0.5 * (a + b), 0.5 * (a - b));
+                [sum[0] + mean / count, sum[1] + mean * mean / count, sum[2] + off * off / count]
+            });
+            let variance = (square - mean * mean).max(f64::MIN_POSITIVE);
+            let [a, b] = halves(i);
+            let own = 0.5 * (a + b);
+            (own + (noise / variance).min(1.0) * (mean - own)).powi(2) + RELMSE_EPSILON
         })
     };
     (0..a.len()).into_par_iter().map(scale).collect()
-}
-
-/// The same where both images are filtered: their mean as it is. Moved towards the pixels around, the rims of lamps, where few pixels
-/// have most of the error, would count for too little: in the Cornell box at 2 and 4 samples, filtered by `auto`, 0.69 and 0.72 of the
-/// error was seen, where this sees 0.83 and 0.96.
-pub fn scales_of_filtered([a, b]: [&Pixels; 2]) -> Vec<[f64; 3]> {
-    let scale = |(a, b): (&[f32; 3], &[f32; 3])| {
-        [0, 1, 2].map(|c| (0.5 * (f64::from(a[c]) + f64::from(b[c]))).powi(2) + RELMSE_EPSILON)
-    };
-    a.iter().zip(b).map(scale).collect()
 }
 
 /// Relative mean square error of either of two unbiased images: half the square of their difference.
@@ -83,11 +73,24 @@ mod tests {
         assert!((scales[0][0] - 1.01).abs() < 1e-12);
         assert!((error([&a, &b], &scales) - 2.0 / 1.01).abs() < 1e-9);
         // The means of the filtered pixels are .8.
-        let of_filtered = scales_of_filtered([&fa, &fb]);
+        let of_filtered = super::scales(2, [&fa, &fb]);
         assert!(of_filtered.iter().flatten().all(|scale| (scale - (0.64 + RELMSE_EPSILON)).abs() < 1e-6));
         // By hand: (1.69 + .09) / 2 - 0 - .3 * 2 + 0 and the same of the other pixel.
         let found = error_of_filtered([&fa, &fb], [&a, &b], &scales);
         assert!((found - (0.89 - 0.6) / 1.01).abs() < 1e-6, "{found}");
+    }
+
+    #[test]
+    fn rare_bright_samples_do_not_hide_their_error() {
+        // A lamp out of focus, which every hundredth of 8 samples finds.
+        let (size, lamp, odds, samples) = (100, 80.0, 0.01, 8);
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut pixel = || (0..samples).filter(|_| random.f32() < odds).count() as f32 * lamp / samples as f32;
+        let [a, b] = [(), ()].map(|()| image(&(0..size * size).map(|_| pixel()).collect::<Vec<_>>()));
+        let (truth, variance) = (f64::from(lamp * odds), f64::from(lamp * lamp * odds * (1.0 - odds)));
+        let relative = variance / samples as f64 / (truth * truth + RELMSE_EPSILON);
+        let found = error([&a, &b], &scales(size, [&a, &b])) / relative;
+        assert!((0.5..2.0).contains(&found), "{found} of the true error");
     }
 
     #[test]

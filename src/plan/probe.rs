@@ -132,11 +132,8 @@ impl<'a> Probe<'a> {
     fn judged(&self, pairs: &[(u32, [Image; 2])]) -> Vec<Level> {
         let width = self.renderer.settings().width as usize;
         let last = &pairs[pairs.len() - 1].1;
-        let filtered = last.each_ref().map(|image| image.filtered.iter().flatten().next());
-        let scales = match filtered {
-            [Some(a), Some(b)] => halves::scales_of_filtered([a, b]),
-            _ => halves::scales(width, last.each_ref().map(|image| &image.noisy[..])),
-        };
+        let cleanest = last.each_ref().map(|image| &image.filtered.iter().flatten().next().unwrap_or(&image.noisy)[..]);
+        let scales = halves::scales(width, cleanest);
         let measured = |[a, b]: &[Image; 2], method: usize| {
             let noisy: [&Pixels; 2] = [&a.noisy, &b.noisy];
             let error = match (&a.filtered[method], &b.filtered[method]) {
