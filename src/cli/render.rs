@@ -15,10 +15,11 @@ use crate::denoise::{self, Filtered, Noisy, Recipe};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime, Tracing};
 use crate::image::{self, Film};
+use crate::layout::Effects;
 use crate::memory;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Checkpoint, Job, Outputs, Renderer, StopReason, all_effects, film};
-use crate::scene::{Loaded, Scene, SceneFile};
+use crate::scene::{Loaded, Scene, SceneFile, light_and_camera_effects};
 use crate::statistics::BrokenSamples;
 use shot::Shot;
 pub use shot::{CHOICES, FRAME};
@@ -151,6 +152,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let (args, settings) = &planned::applied(args, settings, plan.as_ref())?;
     check_room(args.filter(settings), settings, &gpu)?;
     check_stride(args, settings)?;
+    tell_of_lens(args, &scene);
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, settings))?;
     if args.checkpoint.is_some() && !renderer.can_resume() {
         complain(
@@ -385,6 +387,18 @@ pub fn check_stride(args: &Args, settings: &Settings) -> Result<()> {
         ));
     }
     args.denoise.map_or(Ok(()), |method| method.check_stride(stride))
+}
+
+/// What a lens shows of lamps and sky has noise, which filters leave. Given to them with the other light, `guided` spreads it over the
+/// picture (a Cornell box at 32 samples: relMSE 1.3), `auto` loses a fifth of the light of small lamps out of focus, and `svgf` a third.
+fn tell_of_lens(args: &Args, scene: &Scene) {
+    let filters = args.denoise.is_some_and(|method| !method.is_none() && !matches!(method, Method::Oidn));
+    let Effects { lens, emissive, environment, .. } = light_and_camera_effects(scene);
+    if filters && lens && (emissive || environment) && args.common.talkative() {
+        complain(
+            "note: what the lens shows of lamps and sky is not filtered: where they are out of focus, take more samples for less noise",
+        );
+    }
 }
 
 #[cfg(test)]

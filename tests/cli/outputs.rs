@@ -144,3 +144,19 @@ fn what_a_terminal_obeys_is_shown_and_not_sent() {
     let output = Command::new(env!("CARGO_BIN_EXE_tallow")).arg("render").arg(name).output().unwrap();
     complains(&output, 3, &["two\\nlines\\u{1b}[31m.toml"]);
 }
+
+#[test]
+fn noise_that_a_lens_shows_and_a_filter_leaves_is_told() {
+    let folder = TempDir::new().unwrap();
+    let told = |lens: f32, filter: &str| {
+        let scene = format!(
+            "[film]\nwidth = 8\nheight = 8\n[camera]\nposition = [0, 0, 3]\ntarget = [0, 0, 0]\nlens_radius = {lens}\n\
+             [environment]\nradiance = 1\n[[mesh]]\nshape = 'sphere'\n"
+        );
+        std::fs::write(folder.path().join("s.toml"), scene).unwrap();
+        let output = run(&folder, &format!("render s.toml --spp 2 --denoise {filter} -o s.png"));
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap().contains("is not filtered")
+    };
+    assert_eq!([told(0.1, "auto"), told(0.1, "none"), told(0.0, "auto")], [true, false, false]);
+}
