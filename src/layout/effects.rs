@@ -152,9 +152,9 @@ effects! {
     large_lamps: FX_LARGE_LAMPS;
     /// Lamps that shine from both sides.
     two_sided_lamps: FX_TWO_SIDED_LAMPS;
-    /// Up to 32 point and spot lights, one of which is chosen by what it would bring.
+    /// Up to 32 point and spot lights, one of which is chosen by what it would bring; points alone by the tree.
     weighed_lights: FX_WEIGHED_LIGHTS;
-    /// Many lights within the scene: one is chosen by a tree over them.
+    /// Several lights within the scene: one is chosen by a tree over them.
     light_tree: FX_LIGHT_TREE;
     /// Exact spheres among the triangles.
     spheres: FX_SPHERES;

@@ -138,17 +138,18 @@ fn many_lights() -> Loaded {
 
 #[test]
 fn lights_that_are_dark_count_for_nothing() {
-    let with = |lit: usize, dark: usize| {
-        let light =
-            |intensity| format!("[[light]]\ntype = 'point'\nposition = [0.0, 1.0, 0.0]\nintensity = {intensity}\n");
+    let with = |kind: &str, lit: usize, dark: usize| {
+        let aim = if kind == "spot" { "direction = [0.0, -1.0, 0.0]\n" } else { "" };
+        let light = |intensity| {
+            format!("[[light]]\ntype = '{kind}'\nposition = [0.0, 1.0, 0.0]\nintensity = {intensity}\n{aim}")
+        };
         let scene = Workplace::new().scene(&(light(1).repeat(lit) + &light(0).repeat(dark)));
         (scene.weighed_lights, scene.light_tree)
     };
-    assert_eq!(
-        [with(1, 0), with(1, 1), with(32, 0), with(32, 5)],
-        [(false, false), (true, false), (true, false), (true, false)]
-    );
-    assert_eq!([with(33, 0), with(33, 5)], [(false, true); 2]);
+    for (kind, several, many) in [("spot", (true, false), (false, true)), ("point", (false, true), (false, true))] {
+        let found = [(1, 0), (1, 1), (32, 0), (32, 5), (33, 0), (33, 5)].map(|(lit, dark)| with(kind, lit, dark));
+        assert_eq!(found, [(false, false), several, several, several, many, many], "{kind}");
+    }
 }
 
 #[test]

@@ -23,8 +23,8 @@ pub struct Lamp {
     index: u32,
     low: Vec3,
     high: Vec3,
-    /// A point of it.
-    at: Vec3,
+    /// Corners of a triangle.
+    corners: [Vec3; 3],
     /// Unit normal of a triangle, else 0.
     normal: Vec3,
     /// Unit direction in which it shines brightest; 0 where it shines all round or from both sides.
@@ -51,7 +51,7 @@ impl Lamp {
             LIGHT_SPOT => (Vec3::ZERO, b, c.y),
             _ => (Vec3::ZERO, Vec3::ZERO, PI),
         };
-        Self { index, low, high, at: a, normal, axis, edge, power: power as f32 }
+        Self { index, low, high, corners: [a, b, c], normal, axis, edge, power: power as f32 }
     }
 
     fn middle(&self) -> Vec3 {
@@ -141,12 +141,12 @@ impl<'a> Part<'a> {
     /// A point and the normal of the plane in which all lamps lie but for `rounding`, if there is one and they all shine from their front, or
     /// all from both sides.
     fn plane(&self, rounding: f32) -> Option<(Vec3, Vec3)> {
-        let Lamp { at, normal, axis, .. } = self.lamps[0];
+        let Lamp { corners: [at, ..], normal, axis, .. } = self.lamps[0];
         let beside = |lamp: &Lamp| {
             let same = if axis == Vec3::ZERO { lamp.normal.dot(normal).abs() } else { lamp.axis.dot(normal) };
             same > 0.999_999
                 && (lamp.axis == Vec3::ZERO) == (axis == Vec3::ZERO)
-                && (lamp.at - at).dot(normal).abs() <= rounding
+                && lamp.corners.iter().all(|corner| (corner - at).dot(normal).abs() <= rounding)
         };
         (normal != Vec3::ZERO && self.lamps.iter().all(beside)).then_some((at, normal))
     }
@@ -301,6 +301,20 @@ mod tests {
             lights_below(&nodes, 0, &lamps, &mut stray);
             assert!(stray > 0, "control, {count}: smaller bounds");
         }
+    }
+
+    #[test]
+    fn only_lamps_in_one_plane_are_taken_to_lie_there() {
+        let fan = |lift: f32| {
+            let lamp = |i, corners: [Vec3; 3]| {
+                let [a, b, c] = corners.map(|p| p.to_array());
+                Lamp::new(i, &Light { a, b, c, kind: LIGHT_TRIANGLE, ..Light::default() }, 1.0, false)
+            };
+            let rim = [vec3(0.2, 0.0, 0.0), vec3(0.2, 0.2, lift), vec3(0.0, 0.2, 0.0)];
+            let lamps = vec![lamp(0, [Vec3::ZERO, rim[0], rim[1]]), lamp(1, [Vec3::ZERO, rim[1], rim[2]])];
+            snorms(build(lamps, 1.0, &[])[0].beams)[1]
+        };
+        assert!(fan(0.0) == -1.0 && fan(1e-7) == -1.0 && fan(1e-4) > 0.99);
     }
 
     #[test]
