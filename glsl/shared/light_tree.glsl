@@ -34,7 +34,7 @@ float brought_by(LightNode node, Receiver r) {
     float towards = within < 1.0 ? 0.5 + 0.5 * seen : 0.5 / within;
     vec2 beams = unpackSnorm2x16(node.beams);
     float cosine = dot(r.normal, w), beam = -dot(axis, w), tilt = dot(r.normal, axis);
-    bool in_a_plane = beams.y < 0.0, both_sides = in_a_plane && beams.x < -0.5;
+    bool in_a_plane = FX_EMISSIVE && beams.y < 0.0, both_sides = FX_TWO_SIDED_LAMPS && in_a_plane && beams.x < -0.5;
     float share = in_a_plane ? max(1.0 - tilt * tilt, 0.0) : 1.0;
     float arrives = mean_cosine(cosine, towards, share);
     if (r.lets_light_through) arrives += mean_cosine(-cosine, towards, share);
