@@ -172,8 +172,8 @@ impl<'a> Part<'a> {
         });
         let axis = (high - low).max_position();
         let scale = BINS as f32 / (high - low)[axis];
-        if !scale.is_finite() {
-            let (one, other) = lamps.split_at_mut(lamps.len() / 2); // all are in one place
+        if !scale.is_finite() || scale == 0.0 {
+            let (one, other) = lamps.split_at_mut(lamps.len() / 2); // all are in one place, or further apart than numbers tell
             return [Self::of(one), Self::of(other)];
         }
         let bin_of = |lamp: &Lamp| (((lamp.middle()[axis] - low[axis]) * scale) as usize).min(BINS - 1);
@@ -327,6 +327,8 @@ mod tests {
         assert_eq!(on(1), on(3));
         let same = vec![lamps[0]; 1000];
         assert!(build(same, 1.0, &[]).len() < 3000);
+        let far = |x| Lamp { low: vec3(x, 0.0, 0.0), high: vec3(x, 0.0, 0.0), ..lamps[0] };
+        assert!(build([3e38, -3e38].map(far).repeat(8), 1.0, &[]).len() < 50);
         assert_eq!(build(Vec::new(), 0.0, &[(0, 1.0)]).len(), 2);
     }
 }
