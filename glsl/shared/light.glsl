@@ -261,28 +261,29 @@ const float EVEN_SHARE = 0.05;
 // stay apart, as in pbrt-v4. Lights with a surface lie behind the others.
 Light choose_by_share(Receiver r, float u) {
     Light chosen = Light_load(lights, 0u);
-    float sum = 0.0, number = 0.0, odds = 0.0, group = 0.0;
-    bool even = u < EVEN_SHARE;
-    u = min(even ? u / EVEN_SHARE : (u - EVEN_SHARE) / (1.0 - EVEN_SHARE), BELOW_ONE);
-    for (uint i = 0u; i < push.constants.light_count; i++) {
-        Light light = Light_load(lights, i);
+    float sum = 0.0, number = 0.0, group = 0.0;
+    uint end = 0u;
+    for (; end < push.constants.light_count; end++) {
+        Light light = Light_load(lights, end);
         if (is_triangle_light(light.kind) || light.kind == LIGHT_SPHERE) break;
         if (!is_point_or_spot(light.kind)) continue;
-        group += light.probability;
         float brings = unshadowed(light, r);
         sum += brings;
         number += brings > 0.0 ? 1.0 : 0.0;
-        float share = brings > 0.0 ? (even ? 1.0 / number : brings / sum) : 0.0;
-        bool takes = u < share;
-        if (takes) {
-            chosen = light;
-            odds = brings;
-        }
-        u = min(takes ? u / share : (u - share) / (1.0 - share), BELOW_ONE); // its place within the interval that it fell into
+        group += light.probability;
     }
-    chosen.probability = group;
-    if (sum > 0.0) chosen.probability *= mix(odds / sum, 1.0 / number, EVEN_SHARE);
-    else chosen.value = vec3(0.0);
+    // Each light has one interval of [0, 1), so that numbers which are spread evenly there choose lights evenly.
+    float before = 0.0, share = 0.0;
+    for (uint i = 0u; i < end && sum > 0.0 && u >= before; i++) {
+        Light light = Light_load(lights, i);
+        float brings = is_point_or_spot(light.kind) ? unshadowed(light, r) : 0.0;
+        if (brings <= 0.0) continue;
+        chosen = light; // in the end the last, if rounding leaves something
+        share = mix(brings / sum, 1.0 / number, EVEN_SHARE);
+        before += share;
+    }
+    chosen.probability = share > 0.0 ? group * share : group;
+    if (share == 0.0) chosen.value = vec3(0.0);
     return chosen;
 }
 

@@ -96,10 +96,10 @@ pub struct Scene {
     /// animation moves the scene. It stays as the scene was loaded, so that no frame depends on those before it. An engine whose lamps grow
     /// sets it before it makes a renderer; without, the light is the same on average, with more noise near them.
     pub large_lamps: bool,
-    /// Whether one of the point and spot lights is chosen by what each would bring to the point that is lit, as where spots are among
-    /// from two, be they dark now, to 32 that shine. It stays as the scene was loaded, too.
+    /// Whether one of the point and spot lights is chosen by what each would bring to the point that is lit, as where there are from two,
+    /// be they dark now, to 32 that shine. It stays as the scene was loaded, too.
     pub weighed_lights: bool,
-    /// Whether lamps and point lights are chosen by a tree over them, as where there are several. It stays, too.
+    /// Whether lamps are chosen by a tree over them, as where there are several. It stays, too.
     pub light_tree: bool,
     /// Nodes of that tree, see `scene/build/light_tree.rs`; empty without.
     pub light_nodes: Vec<LightNode>,

@@ -4,9 +4,7 @@ use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
 use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
-use crate::shaders::shared::light::{
-    BELOW_ONE, EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY,
-};
+use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
 use crate::twins::light_tree::{choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
@@ -230,31 +228,21 @@ fn unshadowed(light: &Light, r: &Receiver) -> f32 {
 
 /// Chooses anew among the point and spot lights, which lie before those with a surface: by what each would bring if nothing were in
 /// its way.
-fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
-    let (mut chosen, mut sum, mut number, mut odds, mut group) = (scene.lights[0], 0.0, 0.0f32, 0.0, 0.0);
-    let even = u < EVEN_SHARE;
-    u = if even { u / EVEN_SHARE } else { (u - EVEN_SHARE) / (1.0 - EVEN_SHARE) }.min(BELOW_ONE);
+fn choose_by_share(scene: &Scene, r: &Receiver, u: f32) -> Light {
     let before_surfaces = scene.lights.iter().take_while(|light| !light.has_surface());
-    for light in before_surfaces.filter(|light| light.is_point_or_spot()) {
-        group += light.probability;
-        let brings = unshadowed(light, r);
-        sum += brings;
-        number += if brings > 0.0 { 1.0 } else { 0.0 };
-        let share = match brings > 0.0 {
-            true if even => 1.0 / number,
-            true => brings / sum,
-            false => 0.0,
-        };
-        let takes = u < share;
-        if takes {
-            (chosen, odds) = (*light, brings);
+    let group: Vec<_> =
+        before_surfaces.filter(|light| light.is_point_or_spot()).map(|l| (l, unshadowed(l, r))).collect();
+    let probability: f32 = group.iter().map(|(light, _)| light.probability).sum();
+    let lit = || group.iter().filter(|(_, brings)| *brings > 0.0);
+    let (sum, number) = (lit().map(|(_, brings)| brings).sum::<f32>(), lit().count() as f32);
+    let (mut before, mut chosen) = (0.0, Light { probability, value: [0.0; 3], ..scene.lights[0] });
+    for &(light, brings) in lit() {
+        let share = mixed(brings / sum, number);
+        chosen = Light { probability: probability * share, ..*light };
+        before += share;
+        if u < before {
+            break;
         }
-        u = if takes { u / share } else { (u - share) / (1.0 - share) }.min(BELOW_ONE);
-    }
-    chosen.probability = group;
-    match sum > 0.0 {
-        true => chosen.probability *= mixed(odds / sum, number),
-        false => chosen.value = [0.0; 3],
     }
     chosen
 }
