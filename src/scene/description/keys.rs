@@ -137,6 +137,18 @@ mod tests {
     }
 
     #[test]
+    fn a_color_out_of_range_is_told_once_where_it_is_read() {
+        let colors = || KEYS.iter().filter(|key| ["color", "specular", "transmission"].contains(&key.0));
+        for (kind, (key, _, types)) in BUMPED.iter().flat_map(|kind| colors().map(move |key| (*kind, key))) {
+            let table = toml::Table::from_iter([("type".into(), name(kind).into()), ((*key).to_owned(), 2.0.into())]);
+            let said = build(&table, Path::new("")).1;
+            let expected = usize::from(types.contains(&kind));
+            let found = [": clamped".to_owned(), format!("{key} [2.0")].map(|what| said.matches(&what).count());
+            assert_eq!(found, [expected; 2], "{kind:?} {key}: {said}");
+        }
+    }
+
+    #[test]
     fn the_table_has_all_keys() {
         let unknown = toml::from_str::<MaterialTable>("nothing = 1").unwrap_err().to_string();
         let mut known: Vec<_> =

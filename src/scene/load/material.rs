@@ -86,21 +86,26 @@ impl Materials {
     /// A sentence that names the key at fault.
     pub fn push_table(&mut self, t: &MaterialTable, directory: &Path, warn: &mut Vec<String>) -> Result<u32, String> {
         warn.extend(keys::warning(t));
-        let mut m = Self::plain([0.5; 3]);
-        let named = |key: &str| format!("material \"{}\": {key}", t.name);
-        let tint = |v: Option<Rgb>, or: f32, key: &str, warn: &mut Vec<String>| {
-            reflectance(v.map_or([or; 3], |v| v.0), &named(key), warn)
-        };
         if t.kind == Type::MetallicRoughness {
             return self.push_metallic(t, directory, warn);
         }
         let body = matches!(t.kind, Type::Diffuse | Type::Coated);
-        let default = if body && t.color_texture.is_none() { 0.5 } else { 1.0 };
-        m.base_color = tint(t.color, default, "color", warn)?;
-        m.specular = tint(if body { t.specular } else { t.specular.or(t.color) }, 1.0, "specular", warn)?;
-        m.transmission = tint(t.transmission, 1.0, "transmission", warn)?;
-        if t.kind == Type::Dielectric {
-            m.specular = tint(t.specular, 1.0, "specular", warn)?;
+        let mut m = Self::plain([if body && t.color_texture.is_none() { 0.5 } else { 1.0 }; 3]);
+        let mut tint = |to: &mut [f32; 3], color: Option<Rgb>, key: &str| -> Result<(), String> {
+            if let Some(color) = color {
+                *to = reflectance(color.0, &format!("material \"{}\": {key}", t.name), warn)?;
+            }
+            Ok(())
+        };
+        match t.kind {
+            _ if body => tint(&mut m.base_color, t.color, "color")?,
+            Type::Dielectric => tint(&mut m.transmission, t.transmission, "transmission")?,
+            // What a metal reflects is all the colour that it has.
+            _ if t.specular.is_none() => tint(&mut m.specular, t.color, "color")?,
+            _ => {}
+        }
+        if t.kind != Type::Diffuse {
+            tint(&mut m.specular, t.specular, "specular")?;
         }
         m.opacity = within(t.opacity.unwrap_or(1.0), 1.0, "opacity")?;
         let rough = t.roughness_texture.is_some() && t.alpha == 0.0;
