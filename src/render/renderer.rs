@@ -348,7 +348,8 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     let independent_sampler = settings.sampler == Sampler::Independent;
     // Lamps and sky may come to shine later.
     let soft_light = settings.split == Split::Soft;
-    let Scene { large_lamps, weighed_lights, light_tree, .. } = *scene;
+    let Scene { large_lamps, weighed_lights, .. } = *scene;
+    let light_tree = scene.has_light_tree();
     Effects { independent_sampler, large_lamps, weighed_lights, light_tree, soft_light, ..Effects::ALL }
 }
 

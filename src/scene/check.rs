@@ -161,9 +161,6 @@ impl Scene {
     /// Children lie behind their parents, so that every way down ends.
     fn light_tree_fits(&self) -> Checked {
         let count = self.light_nodes.len();
-        if self.light_tree && self.light_nodes.is_empty() {
-            return Err("light_nodes: a tree over the lights needs a root".into());
-        }
         let lights = self.light_nodes.iter().filter(|n| n.child & LIGHT_LEAF != 0 && n.power > 0.0);
         below("node of lights", "light", self.lights.len(), lights.map(|n| n.child & !LIGHT_LEAF))?;
         let inner = self.light_nodes.iter().enumerate().filter(|(_, n)| n.child & LIGHT_LEAF == 0);

@@ -119,7 +119,7 @@ fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
     let name = large.map_or_else(|| "lamps that were or may come to be large".to_owned(), |i| light_name(scene, i));
     let weighed = scene.weighed_lights;
     found.weighed_lights = because(reasons, Effect::weighed_lights, weighed, "several point or spot lights".into());
-    found.light_tree = because(reasons, Effect::light_tree, scene.light_tree, "several lamps".into());
+    found.light_tree = because(reasons, Effect::light_tree, scene.has_light_tree(), "several lamps".into());
     found.large_lamps = because(reasons, Effect::large_lamps, panels && scene.large_lamps, name);
 }
 

@@ -99,9 +99,7 @@ pub struct Scene {
     /// Whether one of the point and spot lights is chosen by what each would bring to the point that is lit, as where there are from two,
     /// be they dark now, to 32 that shine. It stays as the scene was loaded, too.
     pub weighed_lights: bool,
-    /// Whether lamps are chosen by a tree over them, as where there are several. It stays, too.
-    pub light_tree: bool,
-    /// Nodes of that tree, see `scene/build/light_tree.rs`; empty without.
+    /// Nodes of the tree by which lamps are chosen where there are several, see `scene/build/light_tree.rs`; else empty, and that stays, too.
     pub light_nodes: Vec<LightNode>,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
@@ -331,6 +329,11 @@ impl Scene {
         let count = |lights: &[Light]| lights.iter().filter(|light| light.is_delta()).count();
         // Those that are dark now are in the rig.
         count(&self.lights) < self.lights.len() || count(&self.lights).max(count(&self.rig.lights)) > 1
+    }
+
+    /// Whether lamps are chosen by a tree over them.
+    pub fn has_light_tree(&self) -> bool {
+        !self.light_nodes.is_empty()
     }
 
     /// A scene from memory: the tables of a scene file, whose meshes, textures and environment may be data. What files they

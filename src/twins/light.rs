@@ -266,13 +266,13 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
 
 /// One light for a receiver. Radiance is 0 when the light cannot reach the point.
 pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSample {
-    let ((chosen, rest), probability) = match scene.light_tree {
+    let ((chosen, rest), probability) = match scene.has_light_tree() {
         true => choose_light(scene, r, word),
         false if scene.lights.len() == 1 => ((0, word), 0.0),
         false => (alias_choose(&scene.light_table, word), 0.0),
     };
     let (mut light, p) = (scene.lights[chosen as usize], r.position);
-    if scene.light_tree && probability > 0.0 {
+    if scene.has_light_tree() && probability > 0.0 {
         light.probability = probability;
     }
     if scene.weighed_lights && light.is_point_or_spot() {
@@ -291,11 +291,11 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         },
         _ => sample_environment(scene, &light, rest, u),
     };
-    if scene.light_tree && sample.pdf > 0.0 && light.has_surface() {
+    if scene.has_light_tree() && sample.pdf > 0.0 && light.has_surface() {
         let density = scene.triangle_pdf_scale * scene.materials[light.material as usize].emission_weight;
         sample.pdf = nominal_pdf(scene, density, light.probability / sample.pdf, p);
     }
-    if scene.light_tree && probability == 0.0 {
+    if scene.has_light_tree() && probability == 0.0 {
         sample.radiance = Vec3::ZERO;
     }
     sample
@@ -321,7 +321,7 @@ pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosi
     let [_, e1, e2] = s.triangle;
     let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
     let pdf = table_pdf(scene, density, s, origin, t, cosine);
-    if !scene.light_tree || pdf <= 0.0 {
+    if !scene.has_light_tree() || pdf <= 0.0 {
         return pdf;
     }
     let area = if s.radius > 0.0 { 4.0 * PI * s.radius * s.radius } else { 0.5 * unit_vector(e1.cross(e2)).1 };

@@ -97,7 +97,7 @@ fn a_tree_over_lamps_follows_them() {
         Scene::parse(Path::new("lamps.toml"), &text).unwrap().scene
     };
     let mut scene = at(0.0, 3.0);
-    assert!(scene.light_tree && scene.light_nodes.len() > scene.lights.len());
+    assert!(scene.has_light_tree() && scene.light_nodes.len() > scene.lights.len());
     let to = |x: f64| Transform::from([1., 0., 0., x, 0., 1., 0., 2., 0., 0., 1., 0., 0., 0., 0., 1.]);
     scene.apply(&Pose { instances: vec![(0, to(4.0))], ..Pose::default() }).unwrap();
     assert_eq!(scene.light_nodes, at(4.0, 3.0).light_nodes);

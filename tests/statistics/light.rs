@@ -132,7 +132,8 @@ fn many_lights() -> Loaded {
              [[light]]\ntype = 'spot'\nposition = [0.0, 3.0, 0.0]\ndirection = [0.0, -1.0, 0.0]\nintensity = 9.0\n\
              [[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.2]\nirradiance = 0.5\n";
     let mut scene = place.scene(&text);
-    (scene.light_tree, scene.weighed_lights) = (false, false);
+    scene.light_nodes.clear();
+    scene.weighed_lights = false;
     scene
 }
 
@@ -144,7 +145,7 @@ fn lights_that_are_dark_count_for_nothing() {
             format!("[[light]]\ntype = '{kind}'\nposition = [0.0, 1.0, 0.0]\nintensity = {intensity}\n{aim}")
         };
         let scene = Workplace::new().scene(&(light(1).repeat(lit) + &light(0).repeat(dark)));
-        (scene.weighed_lights, scene.light_tree)
+        (scene.weighed_lights, scene.has_light_tree())
     };
     let (several, many) = ((true, false), (false, true));
     for kind in ["spot", "point"] {
@@ -257,7 +258,7 @@ fn a_tree_draws_lights_with_their_probabilities() {
     let text = "[[material]]\nname = 'a'\nemission = 1.0\n[[mesh]]\nfile = 'crowd.obj'\nmaterial = 'a'\n";
     let crowd = Workplace::new().obj("crowd.obj", &crowd).scene(text);
     for (name, scene, alike) in [("few", many_lamps(40), 1), ("crowd", crowd, 256)] {
-        assert!(scene.light_tree, "{name}");
+        assert!(scene.has_light_tree(), "{name}");
         for r in receivers() {
             let claimed = by_tree(&scene, &r);
             let mut observed = vec![0.0; scene.lights.len().div_ceil(alike) + 1];

@@ -246,7 +246,7 @@ fn renders_agree_with_their_twins() {
     for points in [3, 40] {
         let mut lamps = many_lamps(points);
         small(&mut lamps.settings);
-        assert!(lamps.light_tree && lamps.weighed_lights == (points < 33));
+        assert!(lamps.has_light_tree() && lamps.weighed_lights == (points < 33));
         check("many lamps", &run(&gpu, &lamps, called_for(&lamps, &lamps.settings, outputs)));
     }
     check("panel", &run(&gpu, &panel, called_for(&panel, &panel.settings, outputs)));

@@ -23,7 +23,7 @@ use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 /// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
 /// the table. Sets [`Material::emission_weight`], [`Light::probability`], [`Scene::triangle_pdf_scale`], [`Scene::large_lamps`],
-/// [`Scene::weighed_lights`] and [`Scene::light_tree`].
+/// [`Scene::weighed_lights`] and [`Scene::light_nodes`].
 ///
 /// # Errors
 /// [`Error::Memory`](crate::error::Error::Memory).
@@ -37,8 +37,9 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     // Dark ones may light up later.
     let points = |lights: &[Light]| lights.iter().filter(|l| l.is_point_or_spot()).count();
     scene.weighed_lights = points(&scene.rig.lights) > 1 && points(&scene.lights) <= MOST_WEIGHED;
-    scene.light_tree = scene.lights.iter().filter(|l| is_in_tree(scene, l)).count() > MOST_BY_POWER;
-    scene.light_nodes = tree(scene);
+    if scene.lights.iter().filter(|l| is_in_tree(scene, l)).count() > MOST_BY_POWER {
+        scene.light_nodes = tree(scene);
+    }
     Ok(())
 }
 
@@ -109,15 +110,14 @@ pub fn list(scene: &mut Scene) -> Result<()> {
     let probabilities = alias::probabilities(&scene.light_table);
     lights.iter_mut().zip(probabilities).for_each(|(l, p)| l.probability = p as f32);
     (scene.lights, scene.rig.light_numbers) = (lights, numbers);
-    scene.light_nodes = tree(scene);
+    if scene.has_light_tree() {
+        scene.light_nodes = tree(scene);
+    }
     Ok(())
 }
 
-/// The tree over those lights that have one.
+/// The tree over the lights that [`is_in_tree`]; it has a root even if none is.
 fn tree(scene: &Scene) -> Vec<LightNode> {
-    if !scene.light_tree {
-        return Vec::new();
-    }
     let (mut lamps, mut outside, mut probability) = (Vec::new(), Vec::new(), 0.0);
     let powers: Vec<f64> = scene.lights.par_iter().map(|light| power_in_tree(scene, light)).collect();
     for ((index, light), power) in (0..).zip(&scene.lights).zip(powers) {
