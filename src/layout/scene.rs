@@ -292,13 +292,19 @@ impl Light {
     /// The effect that samples it; `None` where `kind` is none of the LIGHT_ constants.
     pub fn effect(&self) -> Option<Effect> {
         match self.kind {
-            LIGHT_TRIANGLE | LIGHT_MIRRORED | LIGHT_SPHERE => Some(Effect::emissive),
+            LIGHT_SPHERE => Some(Effect::emissive),
+            _ if self.is_triangle() => Some(Effect::emissive),
             LIGHT_POINT => Some(Effect::point_lights),
             LIGHT_SPOT => Some(Effect::spot_lights),
             LIGHT_DIRECTIONAL => Some(Effect::directional_lights),
             LIGHT_ENVIRONMENT => Some(Effect::environment),
             _ => None,
         }
+    }
+
+    /// Whether it is a triangle of the scene.
+    pub fn is_triangle(&self) -> bool {
+        matches!(self.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED)
     }
 
     /// Whether it is a triangle or a sphere of the scene, which rays meet.

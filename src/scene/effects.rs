@@ -114,7 +114,7 @@ fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
     found.environment = light(Effect::environment);
     let mapped = found.environment && scene.environment.is_some();
     found.environment_map = because(reasons, Effect::environment_map, mapped, "environment".into());
-    let panels = scene.lights.iter().any(lights::is_panel);
+    let panels = scene.lights.iter().any(Light::is_triangle);
     let large = scene.lights.iter().position(|l| lights::is_large(scene, l));
     let name = large.map_or_else(|| "lamps that were or may come to be large".to_owned(), |i| light_name(scene, i));
     let weighed = scene.weighed_lights;

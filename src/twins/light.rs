@@ -279,7 +279,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         light = choose_by_share(scene, r, u.x);
     }
     let mut sample = match light.kind {
-        LIGHT_TRIANGLE | LIGHT_MIRRORED => sample_triangle_light(scene, &light, p, u),
+        _ if light.is_triangle() => sample_triangle_light(scene, &light, p, u),
         LIGHT_SPHERE => sample_sphere_light(&light, p, u),
         LIGHT_POINT | LIGHT_SPOT => sample_point_light(&light, p),
         LIGHT_DIRECTIONAL => LightSample {

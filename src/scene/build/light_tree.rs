@@ -1,7 +1,7 @@
 //! The tree over the lights of a scene of many, from which `glsl/shared/light_tree.glsl` chooses one (Conty Estevez and Kulla 2018). It is
 //! built from the root down: groups of lights are cut where, by power, extent and spread of directions, least is left together.
 use super::encode::{encode_normal, encode_snorms};
-use crate::layout::{LIGHT_LEAF, LIGHT_MIRRORED, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_TRIANGLE, Light, LightNode};
+use crate::layout::{LIGHT_LEAF, LIGHT_SPHERE, LIGHT_SPOT, Light, LightNode};
 use crate::math::octahedral::octahedral_decode;
 use crate::shaders::shared::light_tree::CHILDREN;
 use glam::{Vec3, vec2};
@@ -41,15 +41,15 @@ impl Lamp {
         let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
         let normal = (b - a).as_dvec3().cross((c - a).as_dvec3()).normalize_or_zero().as_vec3();
         let [low, high] = match light.kind {
-            LIGHT_TRIANGLE | LIGHT_MIRRORED => [a.min(b).min(c), a.max(b).max(c)],
+            _ if light.is_triangle() => [a.min(b).min(c), a.max(b).max(c)],
             LIGHT_SPHERE => [a - b.x, a + b.x],
             _ => [a, a],
         };
         let (normal, axis, edge) = match light.kind {
-            LIGHT_TRIANGLE | LIGHT_MIRRORED if two_sided => (normal, Vec3::ZERO, PI),
-            LIGHT_TRIANGLE | LIGHT_MIRRORED => (normal, normal, FRAC_PI_2),
             LIGHT_SPOT => (Vec3::ZERO, b, c.y),
-            _ => (Vec3::ZERO, Vec3::ZERO, PI),
+            _ if !light.is_triangle() => (Vec3::ZERO, Vec3::ZERO, PI),
+            _ if two_sided => (normal, Vec3::ZERO, PI),
+            _ => (normal, normal, FRAC_PI_2),
         };
         Self { index, low, high, corners: [a, b, c], normal, axis, edge, power: power as f32 }
     }
@@ -246,6 +246,7 @@ impl Group {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::{LIGHT_POINT, LIGHT_TRIANGLE};
     use crate::math::octahedral::snorms;
     use glam::vec3;
 
@@ -256,7 +257,7 @@ mod tests {
         let lamp = |i: u32| {
             let middle = 9.0 * point(i % 5) + point(i + 100);
             let [a, b, c] = [1, 2, 3].map(|k| (middle + 0.1 * point(i + k * 100_000)).to_array());
-            let kind = if i % 7 == 6 { crate::layout::LIGHT_POINT } else { LIGHT_TRIANGLE };
+            let kind = if i % 7 == 6 { LIGHT_POINT } else { LIGHT_TRIANGLE };
             Lamp::new(i, &Light { a, b, c, kind, ..Light::default() }, f64::from(unit(i) + 0.1), false)
         };
         (0..count).map(lamp).collect()

@@ -98,10 +98,10 @@ pub fn list(scene: &mut Scene) -> Result<()> {
     add_triangles(scene, &mut lights, &mut numbers)?;
     drop_copies(scene.rig.lights.len(), &mut lights, &mut numbers);
     let mut powers: Vec<f64> = lights.iter().map(|l| weight(l) * power(scene, l)).collect();
-    let (mut kept, mut named) = (powers.iter(), powers.iter());
-    lights.retain(|_| kept.next().is_some_and(|&p| p > 0.0));
-    numbers.retain(|_| named.next().is_some_and(|&p| p > 0.0));
-    powers.retain(|&p| p > 0.0);
+    let shines: Vec<bool> = powers.iter().map(|&p| p > 0.0).collect();
+    keep(&mut lights, &shines);
+    keep(&mut numbers, &shines);
+    keep(&mut powers, &shines);
     leave_sky(scene, &lights, &mut powers);
     share(&lights, &mut powers);
     let total: f64 = powers.iter().sum();
@@ -182,10 +182,16 @@ fn drop_copies(start: usize, lights: &mut Vec<Light>, numbers: &mut Vec<u64>) {
         let (corners, rest) = place(i);
         xxh3_64_with_seed(bytemuck::bytes_of(&corners), xxh3_64(bytemuck::bytes_of(&rest)))
     };
-    let first = geometry::firsts(lights.len() - start, hash, place);
-    let [mut kept, mut named] = [(); 2].map(|()| std::iter::repeat_n(&true, start).chain(&first));
-    lights.retain(|_| kept.next().is_some_and(|first| *first));
-    numbers.retain(|_| named.next().is_some_and(|first| *first));
+    let mut first = geometry::firsts(lights.len() - start, hash, place);
+    first.splice(0..0, std::iter::repeat_n(true, start));
+    keep(lights, &first);
+    keep(numbers, &first);
+}
+
+/// Drops the items that are not `kept`.
+fn keep<T>(items: &mut Vec<T>, kept: &[bool]) {
+    let mut kept = kept.iter();
+    items.retain(|_| kept.next() == Some(&true));
 }
 
 /// Bits of a lamp's corners. Adding 0 makes -0 the same.
@@ -245,7 +251,7 @@ const LARGE: f64 = 0.01;
 /// Whether a lamp is so large that, seen from points near it, its nearest parts outshine the others.
 pub fn is_large(scene: &Scene, light: &Light) -> bool {
     let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
-    is_panel(light) && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
+    light.is_triangle() && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
 }
 
 /// Whether a light of a scene that has a tree of them lies in it.
@@ -255,11 +261,6 @@ fn is_in_tree(scene: &Scene, light: &Light) -> bool {
 
 fn is_two_sided(scene: &Scene, light: &Light) -> bool {
     scene.materials.get(light.material as usize).is_some_and(|m| m.flags & MATERIAL_EMITS_BEHIND != 0)
-}
-
-/// Whether a light is a triangle.
-pub fn is_panel(light: &Light) -> bool {
-    matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED)
 }
 
 /// How many point and spot lights are weighed at every point at most: it takes time in proportion to their number. A tree leaves 1.1 times the
@@ -315,7 +316,7 @@ fn power(scene: &Scene, light: &Light) -> f64 {
     let value = f64::from(luminance(light.value));
     let emitted = || f64::from(scene.materials[light.material as usize].emission_weight) * unit(scene);
     match light.kind {
-        LIGHT_TRIANGLE | LIGHT_MIRRORED => PI * geometry::area([light.a, light.b, light.c]) * emitted(),
+        _ if light.is_triangle() => PI * geometry::area([light.a, light.b, light.c]) * emitted(),
         LIGHT_SPHERE => 4.0 * (PI * f64::from(light.b[0])).powi(2) * emitted(),
         LIGHT_POINT => 4.0 * PI * value,
         LIGHT_SPOT => {
@@ -332,7 +333,7 @@ fn power(scene: &Scene, light: &Light) -> f64 {
 fn power_in_tree(scene: &Scene, light: &Light) -> f64 {
     match light.kind {
         LIGHT_SPOT => 4.0 * PI * f64::from(luminance(light.value)),
-        LIGHT_TRIANGLE | LIGHT_MIRRORED => power(scene, light) * brightness(scene, light),
+        _ if light.is_triangle() => power(scene, light) * brightness(scene, light),
         _ => power(scene, light),
     }
 }
