@@ -19,11 +19,16 @@ macro_rules! effects {
                 Self { $($field: self.$field || other.$field,)+ }
             }
 
+            /// Whether an effect is on, to be changed.
+            pub fn switch(&mut self, effect: Effect) -> &mut bool {
+                match effect {
+                    $(Effect::$field => &mut self.$field,)+
+                }
+            }
+
             /// The same with one effect switched.
             pub fn toggled(mut self, effect: Effect) -> Self {
-                let switch = match effect {
-                    $(Effect::$field => &mut self.$field,)+
-                };
+                let switch = self.switch(effect);
                 *switch = !*switch;
                 self
             }

@@ -14,71 +14,125 @@ pub fn effects(
     split_light: bool,
     counters: bool,
 ) -> (Effects, Vec<(Effect, String)>) {
-    let mut reasons = Vec::new();
-    let used = used_materials(scene);
-    let mut material = |name, calls: &dyn Fn(&Material) -> bool| {
-        let first = (0..scene.materials.len()).find(|&i| used[i] && calls(&scene.materials[i]));
-        let named = |i: usize| scene.names.materials.get(i).map_or("", |n| n);
-        first.inspect(|&i| reasons.push((name, format!("material \"{}\"", named(i))))).is_some()
-    };
-    let interface = |m: &Material| m.kind != BSDF_DIFFUSE;
-    let mapped = |m: &Material, effect| m.textures().any(|(reader, _)| reader == effect);
-    let flagged = |m: &Material, flags: u32| {
-        m.textures().filter_map(|(_, t)| scene.textures.get(t as usize)).any(|t| t.flags & flags != 0)
-    };
-    let coated = |m: &Material| m.kind == BSDF_METALLIC && m.clearcoat > 0.0;
-    // A roughness map may take any part of the surface below the line.
-    let smooth = |m: &Material| {
-        let coat = coated(m) && (m.clearcoat_alpha < SMOOTH_ALPHA || m.clearcoat_roughness_texture != NONE);
-        interface(m) && (m.alpha < SMOOTH_ALPHA || m.roughness_texture != NONE) || coat
-    };
-    let rough = |m: &Material| {
-        let coat = coated(m) && m.clearcoat_alpha >= SMOOTH_ALPHA;
-        interface(m) && m.alpha >= SMOOTH_ALPHA || coat
-    };
-    // Shadow rays pass them as they pass masks.
-    let sharp = scene.has_delta_lights();
-    let clear_wall = |m: &Material| sharp && m.flags & MATERIAL_CLEAR_WALL != 0;
-    let mut found = Effects {
-        textures: material(Effect::textures, &|m| mapped(m, Effect::textures)),
-        texture_modes: material(Effect::texture_modes, &|m| flagged(m, MODES)),
-        hdr_textures: material(Effect::hdr_textures, &|m| flagged(m, TEXTURE_RGB9E5 | TEXTURE_FLOAT)),
-        second_uv: material(Effect::second_uv, &|m| flagged(m, TEXTURE_SECOND_UV)),
-        alpha_cutoff: material(Effect::alpha_cutoff, &|m| m.flags & MATERIAL_MASKED != 0 && m.alpha_cutoff > 0.0),
-        bump_maps: material(Effect::bump_maps, &|m| mapped(m, Effect::bump_maps)),
-        normal_maps: material(Effect::normal_maps, &|m| mapped(m, Effect::normal_maps)),
-        alpha_masks: material(Effect::alpha_masks, &|m| m.flags & MATERIAL_MASKED != 0 || clear_wall(m)),
-        diffuse: material(Effect::diffuse, &|m| matches!(m.kind, BSDF_DIFFUSE | BSDF_COATED)),
-        conductor: material(Effect::conductor, &|m| m.kind == BSDF_CONDUCTOR),
-        dielectric: material(Effect::dielectric, &|m| m.kind == BSDF_DIELECTRIC),
-        coated: material(Effect::coated, &|m| m.kind == BSDF_COATED),
-        metallic: material(Effect::metallic, &|m| m.kind == BSDF_METALLIC),
-        clearcoat: material(Effect::clearcoat, &coated),
-        coat_normals: material(Effect::coat_normals, &|m| coated(m) && has_normal_map(m)),
-        thin_walls: material(Effect::thin_walls, &|m| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0),
-        clear_walls: material(Effect::clear_walls, &clear_wall),
-        two_sided_lamps: material(Effect::two_sided_lamps, &|m| m.flags & MATERIAL_EMITS_BEHIND != 0),
-        anisotropic: material(Effect::anisotropic, &|m| m.anisotropy != 0.0),
-        rough: material(Effect::rough, &rough),
-        smooth_interface: material(Effect::smooth_interface, &smooth),
-        beckmann: material(Effect::beckmann, &|m| rough(m) && m.flags & MATERIAL_GGX == 0),
-        ggx: material(Effect::ggx, &|m| rough(m) && m.flags & MATERIAL_GGX != 0),
-        ..Effects::default()
-    };
-    light_effects(scene, &mut found, &mut reasons);
-    camera_effects(scene, &mut found, &mut reasons);
-    scene_effects(scene, &mut found, &mut reasons);
-    setting_effects(settings, &mut found, &mut reasons);
+    let mut found = Found::default();
+    found.by_materials(scene);
+    found.by_lights(scene);
+    found.by_camera(scene);
+    found.by_geometry(scene);
+    found.by_settings(settings);
     let soft = keeps_soft_light_apart(scene, settings);
-    found.soft_light = because(&mut reasons, Effect::soft_light, soft, format!("split {}", settings.split.text()));
-    output_effects(split_light, counters, &mut found, &mut reasons);
-    reasons.sort_by_key(|r| r.0);
-    (found, reasons)
+    found.need(Effect::soft_light, soft.then(|| format!("split {}", settings.split.text())));
+    let apart = "an output that keeps direct and indirect light apart";
+    found.need(Effect::split_light, split_light.then(|| apart.into()));
+    found.need(Effect::counters, counters.then(|| "ray counters".into()));
+    found.reasons.sort_by_key(|r| r.0);
+    (found.effects, found.reasons)
+}
+
+/// Those of the effects that lights and the camera call for.
+pub fn light_and_camera_effects(scene: &Scene) -> Effects {
+    let mut found = Found::default();
+    found.by_lights(scene);
+    found.by_camera(scene);
+    found.effects
+}
+
+/// Whether what lamps and sky bring to the first hit is kept with indirect light. Shadows of delta lights are sharp and free of
+/// noise, those of lamps and sky are neither.
+pub fn keeps_soft_light_apart(scene: &Scene, settings: &Settings) -> bool {
+    settings.split == Split::Soft && scene.has_soft_lights()
 }
 
 /// What only some textures do.
 const MODES: u32 =
     TEXTURE_CLAMP_U | TEXTURE_CLAMP_V | TEXTURE_MIRROR_U | TEXTURE_MIRROR_V | TEXTURE_NEAREST | TEXTURE_SHEARED;
+/// Triangles from which on rays gain from testing each other's. In a Cornell box of 36 most lanes have some to test at every
+/// node, so that dealing them costs a sixth; scenes of 1,650 gain a little, of 100,000 a third.
+const DEALT_FROM: usize = 1000;
+/// Most texels of textures that are read one at a time: views of more are beyond the limit of lavapipe and of NVIDIA's driver.
+const NARROW_TEXELS: usize = 1 << 27;
+
+/// The effects that are on so far, and what needs each.
+#[derive(Default)]
+struct Found {
+    effects: Effects,
+    reasons: Vec<(Effect, String)>,
+}
+
+impl Found {
+    /// Switches an effect on if something needs it.
+    fn need(&mut self, effect: Effect, by: Option<String>) {
+        if let Some(by) = by {
+            *self.effects.switch(effect) = true;
+            self.reasons.push((effect, by));
+        }
+    }
+
+    fn by_materials(&mut self, scene: &Scene) {
+        let (used, sharp) = (used_materials(scene), scene.has_delta_lights());
+        for &effect in Effect::ALL {
+            let mut all = scene.materials.iter().zip(&used);
+            let first = all.position(|(m, used)| *used && material_needs(scene, m, sharp, effect));
+            let name = |i: usize| scene.names.materials.get(i).map_or("", |n| n);
+            self.need(effect, first.map(|i| format!("material \"{}\"", name(i))));
+        }
+    }
+
+    fn by_lights(&mut self, scene: &Scene) {
+        use Effect::{directional_lights, emissive, environment, point_lights, spot_lights};
+        for effect in [emissive, point_lights, spot_lights, directional_lights, environment] {
+            // Those that are dark now are in the rig, and a pose may switch them on.
+            let first = scene.lights.iter().chain(&scene.rig.lights).position(|l| l.effect() == Some(effect));
+            self.need(effect, first.map(|i| light_name(scene, i)));
+        }
+        let mapped = self.effects.environment && scene.environment.is_some();
+        self.need(Effect::environment_map, mapped.then(|| "environment".into()));
+        self.need(Effect::weighed_lights, scene.weighed_lights.then(|| "several point or spot lights".into()));
+        self.need(Effect::light_tree, scene.has_light_tree().then(|| "several lamps".into()));
+        let large = scene.large_lamps && scene.lights.iter().any(Light::is_triangle);
+        let first = || scene.lights.iter().position(|l| lights::is_large(scene, l));
+        let moved = || "lamps that were or may come to be large".to_owned();
+        self.need(Effect::large_lamps, large.then(|| first().map_or_else(moved, |i| light_name(scene, i))));
+    }
+
+    fn by_camera(&mut self, scene: &Scene) {
+        self.need(Effect::lens, (scene.view.lens_radius > 0.0).then(|| "camera lens_radius".into()));
+        self.need(Effect::orthographic, scene.view.orthographic.map(|_| "camera orthographic".into()));
+    }
+
+    fn by_geometry(&mut self, scene: &Scene) {
+        let object_of = |triangle: usize| {
+            let object = scene.triangles.get(triangle).map(|t| t.object as usize);
+            format!("object \"{}\"", object.and_then(|o| scene.names.objects.get(o)).map_or("", |name| name))
+        };
+        let shaded = |like: &dyn Fn(&Shading) -> bool| scene.shading.iter().position(like).map(object_of);
+        self.need(Effect::smooth_normals, shaded(&|s| s.normal != geometry::FLAT));
+        self.need(Effect::vertex_colors, shaded(&|s| s.attributes & ATTRIBUTE_COLORS != 0));
+        let Effects { normal_maps, coat_normals, anisotropic, .. } = self.effects;
+        if normal_maps || coat_normals || anisotropic {
+            self.need(Effect::tangents, shaded(&|s| s.attributes & ATTRIBUTE_TANGENTS != 0));
+        }
+        let ball = scene.triangles.iter().position(|t| t.primitive & SPHERE != 0);
+        self.need(Effect::spheres, ball.map(object_of));
+        let [instances, triangles, texels] = [scene.instances.len(), scene.triangles.len(), scene.texels.len()];
+        self.need(Effect::instances, (instances > 0).then(|| format!("{instances} instances")));
+        self.need(Effect::dealt_triangles, (triangles >= DEALT_FROM).then(|| format!("{triangles} triangles")));
+        self.need(Effect::many_texels, (texels > NARROW_TEXELS).then(|| format!("{texels} texels of textures")));
+    }
+
+    fn by_settings(&mut self, s: &Settings) {
+        let mut need = |effect, on: bool, by: String| self.need(effect, on.then_some(by));
+        need(Effect::indirect, s.max_depth > 2, format!("max_depth {}", s.max_depth));
+        need(Effect::roulette, s.roulette_depth > 0, format!("roulette_depth {}", s.roulette_depth));
+        need(Effect::clamp, s.clamp_indirect > 0.0, format!("clamp_indirect {}", s.clamp_indirect));
+        need(Effect::sparse_light, s.indirect_stride > 1, format!("indirect_stride {}", s.indirect_stride));
+        need(Effect::pixel_filter, s.filter != PixelFilter::Box, format!("filter {:?}", s.filter));
+        need(Effect::independent_sampler, s.sampler == Sampler::Independent, "sampler independent".into());
+        need(Effect::adaptive, !s.allocate.is_even(), format!("allocate {}", s.allocate.policy.name));
+        let most = s.spp.max(s.allocate.max_spp);
+        need(Effect::many_samples, most > 4096, format!("{most} samples of a pixel"));
+    }
+}
 
 /// Materials that some triangle or instance has.
 fn used_materials(scene: &Scene) -> Vec<bool> {
@@ -93,34 +147,47 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
     used
 }
 
-/// Those of the effects that lights and the camera call for.
-pub fn light_and_camera_effects(scene: &Scene) -> Effects {
-    let mut found = Effects::default();
-    light_effects(scene, &mut found, &mut Vec::new());
-    camera_effects(scene, &mut found, &mut Vec::new());
-    found
+/// Whether a material calls for an effect. `sharp` says whether the scene has lights without extent.
+fn material_needs(scene: &Scene, m: &Material, sharp: bool, effect: Effect) -> bool {
+    let flagged =
+        |flags: u32| m.textures().filter_map(|(_, t)| scene.textures.get(t as usize)).any(|t| t.flags & flags != 0);
+    let clear_wall = || sharp && m.flags & MATERIAL_CLEAR_WALL != 0;
+    let coated = m.kind == BSDF_METALLIC && m.clearcoat > 0.0;
+    match effect {
+        Effect::textures | Effect::bump_maps | Effect::normal_maps => m.textures().any(|(reader, _)| reader == effect),
+        Effect::texture_modes => flagged(MODES),
+        Effect::hdr_textures => flagged(TEXTURE_RGB9E5 | TEXTURE_FLOAT),
+        Effect::second_uv => flagged(TEXTURE_SECOND_UV),
+        Effect::alpha_cutoff => m.flags & MATERIAL_MASKED != 0 && m.alpha_cutoff > 0.0,
+        // Shadow rays pass clear walls as they pass masks.
+        Effect::alpha_masks => m.flags & MATERIAL_MASKED != 0 || clear_wall(),
+        Effect::diffuse => matches!(m.kind, BSDF_DIFFUSE | BSDF_COATED),
+        Effect::conductor => m.kind == BSDF_CONDUCTOR,
+        Effect::dielectric => m.kind == BSDF_DIELECTRIC,
+        Effect::coated => m.kind == BSDF_COATED,
+        Effect::metallic => m.kind == BSDF_METALLIC,
+        Effect::clearcoat => coated,
+        Effect::coat_normals => coated && has_normal_map(m),
+        Effect::thin_walls => m.kind == BSDF_METALLIC && m.transmission_factor > 0.0,
+        Effect::clear_walls => clear_wall(),
+        Effect::two_sided_lamps => m.flags & MATERIAL_EMITS_BEHIND != 0,
+        Effect::anisotropic => m.anisotropy != 0.0,
+        Effect::rough => is_rough(m, coated),
+        Effect::smooth_interface => is_smooth(m, coated),
+        Effect::beckmann => is_rough(m, coated) && m.flags & MATERIAL_GGX == 0,
+        Effect::ggx => is_rough(m, coated) && m.flags & MATERIAL_GGX != 0,
+        _ => false,
+    }
 }
 
-fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
-    // Those that are dark now are in the rig, and a pose may switch them on.
-    let mut light = |effect| {
-        let first = scene.lights.iter().chain(&scene.rig.lights).position(|l| l.effect() == Some(effect));
-        first.inspect(|&i| reasons.push((effect, light_name(scene, i)))).is_some()
-    };
-    found.emissive = light(Effect::emissive);
-    found.point_lights = light(Effect::point_lights);
-    found.spot_lights = light(Effect::spot_lights);
-    found.directional_lights = light(Effect::directional_lights);
-    found.environment = light(Effect::environment);
-    let mapped = found.environment && scene.environment.is_some();
-    found.environment_map = because(reasons, Effect::environment_map, mapped, "environment".into());
-    let panels = scene.lights.iter().any(Light::is_triangle);
-    let large = scene.lights.iter().position(|l| lights::is_large(scene, l));
-    let name = large.map_or_else(|| "lamps that were or may come to be large".to_owned(), |i| light_name(scene, i));
-    let weighed = scene.weighed_lights;
-    found.weighed_lights = because(reasons, Effect::weighed_lights, weighed, "several point or spot lights".into());
-    found.light_tree = because(reasons, Effect::light_tree, scene.has_light_tree(), "several lamps".into());
-    found.large_lamps = because(reasons, Effect::large_lamps, panels && scene.large_lamps, name);
+fn is_rough(m: &Material, coated: bool) -> bool {
+    m.kind != BSDF_DIFFUSE && m.alpha >= SMOOTH_ALPHA || coated && m.clearcoat_alpha >= SMOOTH_ALPHA
+}
+
+/// Whether some of it may be smooth: a roughness map may take any part of the surface below the line.
+fn is_smooth(m: &Material, coated: bool) -> bool {
+    let interface = m.kind != BSDF_DIFFUSE && (m.alpha < SMOOTH_ALPHA || m.roughness_texture != NONE);
+    interface || coated && (m.clearcoat_alpha < SMOOTH_ALPHA || m.clearcoat_roughness_texture != NONE)
 }
 
 /// That of a light of the scene or, with a number beyond those, of the rig.
@@ -136,83 +203,6 @@ fn light_name(scene: &Scene, index: usize) -> String {
         None if light.kind == LIGHT_ENVIRONMENT => "environment".into(),
         None => format!("light {index}"),
     }
-}
-
-type Reasons = Vec<(Effect, String)>;
-
-/// Notes why an effect is on.
-fn because(reasons: &mut Reasons, name: Effect, on: bool, why: String) -> bool {
-    if on {
-        reasons.push((name, why));
-    }
-    on
-}
-
-/// Triangles from which on rays gain from testing each other's. In a Cornell box of 36 most lanes have some to test at every
-/// node, so that dealing them costs a sixth; scenes of 1,650 gain a little, of 100,000 a third.
-const DEALT_FROM: usize = 1000;
-/// Most texels of textures that are read one at a time: views of more are beyond the limit of lavapipe and of NVIDIA's driver.
-const NARROW_TEXELS: usize = 1 << 27;
-
-fn camera_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
-    let mut because = |name, on, why: &str| because(reasons, name, on, why.to_owned());
-    found.lens = because(Effect::lens, scene.view.lens_radius > 0.0, "camera lens_radius");
-    found.orthographic = because(Effect::orthographic, scene.view.orthographic.is_some(), "camera orthographic");
-}
-
-fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
-    let mut because = |name, on, why| because(reasons, name, on, why);
-    let bent = scene.shading.iter().position(|s| s.normal != geometry::FLAT);
-    let object =
-        bent.and_then(|i| scene.triangles.get(i)).map(|t| t.object as usize).and_then(|o| scene.names.objects.get(o));
-    let named = format!("object \"{}\"", object.map_or("", |o| o));
-    found.smooth_normals = because(Effect::smooth_normals, bent.is_some(), named);
-    let mut attribute = |name, bit: u32| {
-        let first = scene.shading.iter().position(|s| s.attributes & bit != 0).and_then(|i| scene.triangles.get(i));
-        let object = first.and_then(|t| scene.names.objects.get(t.object as usize));
-        because(name, first.is_some(), format!("object \"{}\"", object.map_or("", |o| o)))
-    };
-    found.vertex_colors = attribute(Effect::vertex_colors, ATTRIBUTE_COLORS);
-    let directed = found.normal_maps || found.coat_normals || found.anisotropic;
-    found.tangents = directed && attribute(Effect::tangents, ATTRIBUTE_TANGENTS);
-    let ball = scene.triangles.iter().find(|t| t.primitive & SPHERE != 0);
-    let object = ball.and_then(|t| scene.names.objects.get(t.object as usize));
-    found.spheres = because(Effect::spheres, ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));
-    let instances = scene.instances.len();
-    found.instances = because(Effect::instances, instances > 0, format!("{instances} instances"));
-    let triangles = scene.triangles.len();
-    let dealt = triangles >= DEALT_FROM;
-    found.dealt_triangles = because(Effect::dealt_triangles, dealt, format!("{triangles} triangles"));
-    let texels = scene.texels.len();
-    found.many_texels = because(Effect::many_texels, texels > NARROW_TEXELS, format!("{texels} texels of textures"));
-}
-
-fn setting_effects(s: &Settings, found: &mut Effects, reasons: &mut Reasons) {
-    let mut because = |name, on, why| because(reasons, name, on, why);
-    found.indirect = because(Effect::indirect, s.max_depth > 2, format!("max_depth {}", s.max_depth));
-    found.roulette = because(Effect::roulette, s.roulette_depth > 0, format!("roulette_depth {}", s.roulette_depth));
-    found.clamp = because(Effect::clamp, s.clamp_indirect > 0.0, format!("clamp_indirect {}", s.clamp_indirect));
-    let stride = s.indirect_stride;
-    found.sparse_light = because(Effect::sparse_light, stride > 1, format!("indirect_stride {stride}"));
-    found.pixel_filter = because(Effect::pixel_filter, s.filter != PixelFilter::Box, format!("filter {:?}", s.filter));
-    let independent = s.sampler == Sampler::Independent;
-    found.independent_sampler = because(Effect::independent_sampler, independent, "sampler independent".into());
-    let policy = s.allocate.policy.name;
-    found.adaptive = because(Effect::adaptive, !s.allocate.is_even(), format!("allocate {policy}"));
-    let most = s.spp.max(s.allocate.max_spp);
-    found.many_samples = because(Effect::many_samples, most > 4096, format!("{most} samples of a pixel"));
-}
-
-/// Whether what lamps and sky bring to the first hit is kept with indirect light. Shadows of delta lights are sharp and free of
-/// noise, those of lamps and sky are neither.
-pub fn keeps_soft_light_apart(scene: &Scene, settings: &Settings) -> bool {
-    settings.split == Split::Soft && scene.has_soft_lights()
-}
-
-fn output_effects(split_light: bool, counters: bool, found: &mut Effects, reasons: &mut Reasons) {
-    let why = "an output that keeps direct and indirect light apart";
-    found.split_light = because(reasons, Effect::split_light, split_light, why.into());
-    found.counters = because(reasons, Effect::counters, counters, "ray counters".into());
 }
 
 #[cfg(test)]
