@@ -33,6 +33,7 @@ mod relit;
 mod rig;
 
 pub use build::attributes::words_of as attribute_words;
+pub use build::bvh::Bounds;
 pub use build::coat::{CoatRow, coat_table, microfacet_table};
 pub use build::fresnel::mean_internal as mean_internal_fresnel;
 pub use change::{Change, Deformed};
@@ -107,7 +108,7 @@ pub struct Scene {
     /// the hierarchy sorts them, since another version or machine may sort them differently.
     pub content: Fingerprint,
     /// World-space bounds of all geometry; zero when there is none.
-    pub bounds: [[f32; 3]; 2],
+    pub bounds: Bounds,
     /// What can move: see [`Scene::apply`].
     pub rig: Rig,
     /// Names of objects and materials by index, for `tallow explain` and reports.

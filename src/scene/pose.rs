@@ -27,11 +27,19 @@ pub struct Pose {
 }
 
 impl Pose {
+    /// Whether it places or deforms something.
+    pub fn moves(&self) -> bool {
+        !(self.instances.is_empty() && self.meshes.is_empty())
+    }
+
+    /// Whether it changes light or matter.
+    pub fn shines(&self) -> bool {
+        !(self.materials.is_empty() && self.lights.is_empty()) || self.environment.is_some()
+    }
+
     /// Whether it says where the camera is, and of nothing else.
     pub fn is_of_camera_alone(&self) -> bool {
-        let Self { camera: _, instances, meshes, materials, lights, environment, rebuild_above: _ } = self;
-        let tables = instances.is_empty() && meshes.is_empty() && materials.is_empty() && lights.is_empty();
-        tables && environment.is_none()
+        !self.moves() && !self.shines()
     }
 }
 

@@ -6,7 +6,7 @@ use super::build::soft::Soft;
 use super::description::Description;
 use super::fingerprint::Fingerprint;
 use crate::error::{Error, Result};
-use crate::layout::{Instance, Light, Material, NONE};
+use crate::layout::{Instance, Light, Material, NONE, Triangle};
 use glam::DAffine3;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -83,8 +83,10 @@ impl Tree {
         self.soft.as_ref().map_or(index, |soft| first + soft.order[(index - first) as usize])
     }
 
-    /// Puts `lit` in its order.
-    pub fn sort_lit(&mut self) {
+    /// Finds the triangles that emit, given those of the scene.
+    pub fn list_lit(&mut self, triangles: &[Triangle], materials: &[Material]) {
+        let lit = |&i: &usize| materials[triangles[i].material as usize].emission_weight > 0.0;
+        self.lit = self.range.clone().filter(lit).map(|i| i as u32).collect();
         if let Some(soft) = &self.soft {
             self.lit.sort_unstable_by_key(|&i| soft.order[i as usize - self.range.start]);
         }

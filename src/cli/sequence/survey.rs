@@ -4,7 +4,7 @@ use crate::render::Outputs;
 use crate::render::called_for;
 use crate::render::settings::Settings;
 use crate::scene::animation::Animation;
-use crate::scene::{Pose, Scene};
+use crate::scene::{Bounds, Pose, Scene};
 use std::ops::Range;
 
 /// Frames that are looked at for effects: of more, some that are spread evenly.
@@ -30,14 +30,14 @@ impl Survey<'_> {
         let mut effects = called_for(self.scene, settings, outputs);
         let mut scene = None;
         // The vertices of skins and files take longer to find than all else of a pose, and call for nothing.
-        let looks = |pose: &Pose| pose.camera.is_some() || shines(pose);
+        let looks = |pose: &Pose| pose.camera.is_some() || pose.shines();
         for pose in self.poses(FOR_EFFECTS, looks) {
             if let Some(camera) = &pose.camera {
                 effects.lens |= camera.lens_radius > 0.0;
                 effects.orthographic |= camera.orthographic.is_some();
             }
             let pose = Pose { camera: None, instances: Vec::new(), meshes: Vec::new(), ..pose };
-            if !shines(&pose) {
+            if !pose.shines() {
                 continue;
             }
             let scene = scene.get_or_insert_with(|| self.scene.clone());
@@ -55,9 +55,8 @@ impl Survey<'_> {
         if camera.position.is_some() || camera.world_from_camera.is_some() {
             return None;
         }
-        let moves = |pose: &Pose| !(pose.instances.is_empty() && pose.meshes.is_empty());
         let (mut scene, mut found) = (None, None);
-        for pose in self.poses(FOR_BOUNDS, moves) {
+        for pose in self.poses(FOR_BOUNDS, Pose::moves) {
             let scene = scene.get_or_insert_with(|| self.scene.clone());
             let pose = Pose { camera: None, rebuild_above: f32::INFINITY, ..pose };
             if scene.apply(&pose).is_ok() && scene.bounds != Bounds::default() {
@@ -84,16 +83,9 @@ impl Survey<'_> {
     }
 }
 
-type Bounds = [[f32; 3]; 2];
-
 fn union(a: Bounds, b: Bounds) -> Bounds {
     let join = |end: usize, of: fn(f32, f32) -> f32| [0, 1, 2].map(|axis| of(a[end][axis], b[end][axis]));
     [join(0, f32::min), join(1, f32::max)]
-}
-
-/// Whether it changes light or matter.
-fn shines(pose: &Pose) -> bool {
-    !(pose.materials.is_empty() && pose.lights.is_empty()) || pose.environment.is_some()
 }
 
 /// So many of the frames, evenly, with the first and the last; or all.

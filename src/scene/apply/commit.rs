@@ -109,9 +109,7 @@ fn rebuild(scene: &mut Scene, index: usize, copies: &mut [Instance], change: &mu
     }
     let before = std::mem::replace(&mut soft.order, order);
     renumber(&mut change.triangle_now, &range, &numbers(&before, &soft.order), scene.triangles.len());
-    let lit = |&i: &usize| scene.materials[scene.triangles[i].material as usize].emission_weight > 0.0;
-    tree.lit = range.clone().filter(lit).map(|i| i as u32).collect();
-    tree.sort_lit();
+    tree.list_lit(&scene.triangles, &scene.materials);
     let from = put(scene, index, built, copies);
     change.nodes.push(from..scene.nodes.len());
     let tree = &mut scene.rig.trees[index];

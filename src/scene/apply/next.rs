@@ -12,7 +12,7 @@ use crate::scene::description::Transform;
 use crate::scene::load::material::radiance;
 use crate::scene::pose::{EnvironmentChange, Pose, Vertices};
 use crate::scene::{Fingerprint, Scene};
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, Vec3};
 use std::collections::HashSet;
 
 type Checked<T> = Result<T, String>;
@@ -64,9 +64,7 @@ impl Next {
     /// # Errors
     /// A sentence with what cannot be.
     pub fn of(scene: &Scene, pose: &Pose) -> Checked<Self> {
-        let moves = !(pose.instances.is_empty() && pose.meshes.is_empty());
-        let shines = !(pose.materials.is_empty() && pose.lights.is_empty()) || pose.environment.is_some();
-        if !scene.rig.is_built() && (moves || shines) {
+        if !scene.rig.is_built() && !pose.is_of_camera_alone() {
             return Err("the scene was neither loaded nor built from a description: only its camera can move".into());
         }
         each_once(pose.meshes.iter().map(|(mesh, _)| *mesh))?;
@@ -74,7 +72,7 @@ impl Next {
             pose.meshes.iter().map(|(mesh, to)| next_mesh(scene, *mesh, to)).collect::<Checked<Vec<_>>>()?;
         meshes.retain(|mesh| pose.rebuild_above == 0.0 || mesh.is_new(scene));
         let materials = next_materials(scene, pose)?;
-        let copies = match moves {
+        let copies = match pose.moves() {
             true => Some(next_copies(scene, pose, &meshes, materials.as_deref().unwrap_or(&scene.materials))?),
             false => None,
         };
@@ -189,9 +187,7 @@ fn copies(scene: &Scene) -> Vec<Instance> {
 
 /// [`sphere_shines`] for all triangles of a copy.
 fn spheres_shine(scene: &Scene, copy: u32, at: &Instance, materials: &[Material]) -> Checked<()> {
-    let [x, y, z] =
-        [at.world0, at.world1, at.world2].map(|row| DVec3::new(row[0].into(), row[1].into(), row[2].into()));
-    let even = is_even(&DAffine3::from_mat3(DMat3::from_cols(x, y, z).transpose()));
+    let even = is_even(&DAffine3::from_mat4(bvh::world_from_object(at).as_dmat4()));
     let tree = &scene.rig.trees[scene.rig.tree_of[copy as usize] as usize];
     let worn = |triangle: &Triangle| if at.material == NONE { triangle.material } else { at.material };
     scene.triangles[tree.range.clone()].iter().try_for_each(|t| sphere_shines(t, even, &materials[worn(t) as usize]))

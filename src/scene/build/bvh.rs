@@ -96,10 +96,15 @@ pub fn build_top(
     (root, order)
 }
 
+/// The transform of an instance.
+pub fn world_from_object(instance: &Instance) -> Mat4 {
+    let [x, y, z] = [instance.world0, instance.world1, instance.world2].map(Vec4::from);
+    Mat4::from_cols(x, y, z, Vec4::W).transpose()
+}
+
 /// World-space bounds of a placed box.
 pub fn world_bounds(instance: &Instance, [low, high]: Bounds) -> Bounds {
-    let rows = [instance.world0, instance.world1, instance.world2].map(Vec4::from);
-    let world = Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose();
+    let world = world_from_object(instance);
     let corners = (0..8).map(|i| {
         let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
         world.transform_point3(Vec3::new(pick(0), pick(1), pick(2)))

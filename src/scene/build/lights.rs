@@ -8,7 +8,7 @@
 use super::brightness::brightness;
 use super::environment::mean_luminance;
 use super::light_tree::{self, Lamp};
-use super::{alias, geometry};
+use super::{alias, bvh, geometry};
 use crate::error::Result;
 use crate::layout::*;
 use crate::math::srgb::luminance;
@@ -16,7 +16,7 @@ use crate::memory;
 use crate::scene::Scene;
 use crate::scene::load::texture;
 use crate::scene::rig::Tree;
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Mat4, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
@@ -60,12 +60,7 @@ pub fn weigh(scene: &mut Scene) {
         let sides = if m.flags & MATERIAL_EMITS_BEHIND != 0 { 2.0 } else { 1.0 };
         m.emission_weight = (f64::from(luminance(emission) * opacity * sides) / unit) as f32;
     }
-    let (triangles, materials) = (&scene.triangles, &scene.materials);
-    for tree in &mut scene.rig.trees {
-        let lit = |&i: &usize| materials[triangles[i].material as usize].emission_weight > 0.0;
-        tree.lit = tree.range.clone().filter(lit).map(|i| i as u32).collect();
-        tree.sort_lit();
-    }
+    scene.rig.trees.iter_mut().for_each(|tree| tree.list_lit(&scene.triangles, &scene.materials));
 }
 
 /// What [`Material::emission_weight`] is counted in.
@@ -152,10 +147,8 @@ fn add_triangles(scene: &Scene, lights: &mut Vec<Light>, numbers: &mut Vec<u64>)
     let placed = || rig.seen(scene).filter(|(_, tree, instance)| lit(tree, instance) > 0);
     reserve(lights, placed().map(|(_, tree, instance)| lit(tree, instance)).sum())?;
     for (copy, tree, instance) in placed() {
-        let rows = [instance.world0, instance.world1, instance.world2].map(Vec4::from);
-        let world = Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose();
         let material = (instance.material != NONE).then_some(instance.material);
-        let at = Some((world, instance.mirrored == 1));
+        let at = Some((bvh::world_from_object(instance), instance.mirrored == 1));
         let mut add = |index: usize| {
             lights.push(surface_light(scene, index, at, material));
             numbers.push(u64::from(copy + 1) << 32 | u64::from(tree.number_of(index as u32)));
