@@ -36,6 +36,7 @@ pub use build::attributes::words_of as attribute_words;
 pub use build::bvh::Bounds;
 pub use build::coat::{CoatRow, coat_table, microfacet_table};
 pub use build::fresnel::mean_internal as mean_internal_fresnel;
+pub(crate) use build::geometry::FLAT;
 pub use change::{Change, Deformed};
 pub use check::check_camera;
 pub use effects::{effects, keeps_soft_light_apart, light_and_camera_effects};

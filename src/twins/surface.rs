@@ -4,9 +4,9 @@ use crate::layout::{
 };
 use crate::math::octahedral::{octahedral_decode, octahedral_vector};
 use crate::math::warp::basis_from_normal;
-use crate::scene::Scene;
 use crate::scene::attributes::Attributes;
 use crate::scene::lookup::reads_second;
+use crate::scene::{FLAT, Scene};
 use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
 use crate::twins::bsdf::{Bsdf, bsdf_is_specular};
 use crate::twins::metallic::{Metallic, Parameters};
@@ -54,6 +54,29 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// A point of what a ray hits with one normal and without coordinates of textures, on a triangle or sphere that is yet to be named.
+    fn bare(scene: &Scene, hit: &Hit, position: Vec3, geometric: Vec3, clearance: f32) -> Self {
+        let material = material_of(scene, hit.triangle, hit.instance);
+        let first = scene.instances.get(hit.instance as usize).map_or(0, |i| i.object);
+        Self {
+            position,
+            geometric,
+            smooth_normal: geometric,
+            normal: geometric,
+            coat_normal: geometric,
+            material,
+            flags: scene.materials[material as usize].flags,
+            object: first + scene.triangles[hit.triangle as usize].object,
+            uv: Vec2::ZERO,
+            second_uv: Vec2::ZERO,
+            color: Vec4::ONE,
+            tangent: Vec4::ZERO,
+            triangle: [Vec3::ZERO; 3],
+            radius: 0.0,
+            clearance,
+        }
+    }
+
     /// Origin of a ray that leaves the surface towards `w`.
     pub fn ray_origin(&self, w: Vec3) -> Vec3 {
         let along = if w.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
@@ -158,8 +181,6 @@ fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
     let equator = vec2(n.dot(ball.meridian), n.dot(side)).length() / radius;
     let around = (n.dot(ball.meridian) * side - n.dot(side) * ball.meridian) / radius;
     let (mut e1, mut e2) = (2.0 * PI * around, (ball.pole - n.dot(ball.pole) * n) * (PI / equator.max(1e-6)));
-    let mut object = scene.triangles[hit.triangle as usize].object;
-    let material = material_of(scene, hit.triangle, hit.instance);
     let mut geometric = n;
     if let Some(i) = scene.instances.get(hit.instance as usize) {
         let world = world_from_object(i);
@@ -168,27 +189,18 @@ fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
         reach = world.magnitude(object_from_world(i).magnitude(centre.abs()));
         (point, e1, e2) = (world.vector(point), world.vector(e1), world.vector(e2));
         radius = world.vector(ball.pole).length();
-        object += i.object;
     }
     if ball.inward() {
         geometric = -geometric;
     }
+    let clearance = plane_clearance(geometric, reach, point, Vec3::splat(radius));
+    let uv = ball.coordinates(n);
     let mut s = Surface {
-        position: centre + point,
-        geometric,
-        smooth_normal: geometric,
-        normal: geometric,
-        coat_normal: geometric,
-        material,
-        flags: scene.materials[material as usize].flags,
-        object,
-        uv: ball.coordinates(n),
-        second_uv: ball.coordinates(n),
-        color: Vec4::ONE,
-        tangent: Vec4::ZERO,
+        uv,
+        second_uv: uv,
         triangle: [centre, Vec3::ZERO, Vec3::ZERO],
         radius,
-        clearance: plane_clearance(geometric, reach, point, Vec3::splat(radius)),
+        ..Surface::bare(scene, hit, centre + point, geometric, clearance)
     };
     perturb(scene, &mut s, Some([e1, e2]));
     s
@@ -202,37 +214,20 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     let [mut p0, p1, p2] = triangle_vertices(scene, hit.triangle);
     let (mut e1, mut e2) = (p1 - p0, p2 - p0);
     let mut reach = p0.abs();
-    let mut object = scene.triangles[hit.triangle as usize].object;
     let instance = scene.instances.get(hit.instance as usize);
     if let Some(i) = instance {
         let world = world_from_object(i);
         (p0, e1, e2) = (world.point(p0), world.vector(e1), world.vector(e2));
         reach = world.magnitude(object_from_world(i).magnitude(p0.abs()));
-        object += i.object;
     }
-    let material = material_of(scene, hit.triangle, hit.instance);
     let mirrored = instance.is_some_and(|i| i.mirrored != 0);
     let scaled = if mirrored { e2.cross(e1) } else { e1.cross(e2) };
     let (geometric, _) = unit_vector(scaled);
-    let mut s = Surface {
-        position: p0 + hit.barycentric.x * e1 + hit.barycentric.y * e2,
-        geometric,
-        smooth_normal: geometric,
-        normal: geometric,
-        coat_normal: geometric,
-        material,
-        flags: scene.materials[material as usize].flags,
-        object,
-        uv: Vec2::ZERO,
-        second_uv: Vec2::ZERO,
-        color: Vec4::ONE,
-        tangent: Vec4::ZERO,
-        triangle: [p0, e1, e2],
-        radius: 0.0,
-        clearance: plane_clearance(geometric, reach, e1, e2),
-    };
+    let position = p0 + hit.barycentric.x * e1 + hit.barycentric.y * e2;
+    let clearance = plane_clearance(geometric, reach, e1, e2);
+    let mut s = Surface { triangle: [p0, e1, e2], ..Surface::bare(scene, hit, position, geometric, clearance) };
     let Some(shading) = scene.shading.get(hit.triangle as usize) else { return s };
-    if shading.normal != [0xffffffff; 3] {
+    if shading.normal != FLAT {
         let [n0, n1, n2] = shading.normal.map(octahedral_decode);
         let n = n0 * (1.0 - hit.barycentric.x) + n1 * hit.barycentric.x + hit.barycentric.y * (n2 - n0);
         let (n, length) = unit_vector(instance.map_or(n, |i| object_from_world(i).normal(n)));
@@ -253,7 +248,7 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     }
     if let Some([uv0, uv1, uv2]) = attributes.second_coordinates() {
         s.second_uv = uv0 + b.x * (uv1 - uv0) + b.y * (uv2 - uv0);
-        let bump = scene.materials[material as usize].bump_texture;
+        let bump = scene.materials[s.material as usize].bump_texture;
         if bump != NONE && reads_second(scene, bump) {
             (d1, d2) = (uv1 - uv0, uv2 - uv0);
         }
