@@ -1,4 +1,5 @@
-// Choice of a light by an alias table in proportion to power, or by what it brings, sampling of a point on it, and the densities for MIS.
+// Choice of a light by an alias table in proportion to power, by what it brings, or by the tree of light_tree.glsl, sampling of a point
+// on it, and the densities for MIS.
 #include "shared/surface.glsl"
 #include "shared/segment.glsl"
 #include "shared/luminance.glsl"
@@ -30,8 +31,7 @@ struct Receiver {
 // .0051 of .028 at 4, FLIP .025 of .040 and .013 of .018.
 const float SHARP_PROBABILITY = 0.9;
 
-const float MAX_ODDS = 1e30;        // so that sums of odds stay finite
-const float BELOW_ONE = 0.99999994; // the largest number below 1
+const float MAX_ODDS = 1e30; // so that sums of odds stay finite
 
 // The slot of an alias table of `n` that the word `random` chooses.
 uint alias_slot(uint n, uint random) {
@@ -50,7 +50,7 @@ uint alias_choose(AliasEntry entry, uint n, inout uint random) {
     uint hash = pcg(random);
     float into = float(stays ? low : low - entry.threshold) + float(hash) * (float(n) / 4294967296.0);
     float share = stays ? float(entry.threshold) : 4294967296.0 - float(entry.threshold);
-    random = (min(uint(into / share * 16777216.0), 0xffffffu) << 8) | (hash & 0xffu);
+    random = word_of_unit(into / share, hash);
     return stays ? slot : entry.alias;
 }
 

@@ -104,8 +104,7 @@ uint choose_light(Receiver r, inout uint word, out float probability) {
         if (outside.power > 0.0 && u >= before) {
             light = outside.child & ~LIGHT_LEAF;
             probability = outside.power;
-            float within = min((u - before) / outside.power, BELOW_ONE);
-            word = (uint(within * 16777216.0) << 8) | (hash & 0xffu);
+            word = word_of_unit((u - before) / outside.power, hash);
         }
         before += outside.power;
     }

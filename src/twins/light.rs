@@ -1,11 +1,11 @@
 //! Twin of `glsl/shared/light.glsl`.
 use crate::layout::*;
-use crate::math::hash::pcg;
+use crate::math::hash::{pcg, word_of_unit};
 use crate::math::srgb::luminance;
 use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
 use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
-use crate::twins::light_tree::{choose_light, nominal_pdf, spot_share};
+use crate::twins::light_tree::{Choice, choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
@@ -40,8 +40,7 @@ pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
     let into =
         (if stays { low } else { low - entry.threshold }) as f32 + hash as f32 * (table.len() as f32 / 4294967296.0);
     let share = if stays { entry.threshold as f32 } else { 4294967296.0 - entry.threshold as f32 };
-    let rest = (((into / share * 16777216.0) as u32).min(0xffffff) << 8) | (hash & 0xff);
-    (if stays { slot } else { entry.alias }, rest)
+    (if stays { slot } else { entry.alias }, word_of_unit(into / share, hash))
 }
 
 fn environment_uv(d: Vec3, sine: f32) -> Vec2 {
@@ -266,13 +265,17 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
 
 /// One light for a receiver. Radiance is 0 when the light cannot reach the point.
 pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSample {
-    let ((chosen, rest), probability) = match scene.has_light_tree() {
+    let by_tree = scene.has_light_tree();
+    let Choice { light: chosen, rest, probability } = match by_tree {
         true => choose_light(scene, r, word),
-        false if scene.lights.len() == 1 => ((0, word), 0.0),
-        false => (alias_choose(&scene.light_table, word), 0.0),
+        false if scene.lights.len() == 1 => Choice { light: 0, rest: word, probability: 0.0 },
+        false => {
+            let (light, rest) = alias_choose(&scene.light_table, word);
+            Choice { light, rest, probability: 0.0 }
+        }
     };
     let (mut light, p) = (scene.lights[chosen as usize], r.position);
-    if scene.has_light_tree() && probability > 0.0 {
+    if by_tree && probability > 0.0 {
         light.probability = probability;
     }
     if scene.weighed_lights && light.is_point_or_spot() {
@@ -291,11 +294,11 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         },
         _ => sample_environment(scene, &light, rest, u),
     };
-    if scene.has_light_tree() && sample.pdf > 0.0 && light.has_surface() {
+    if by_tree && sample.pdf > 0.0 && light.has_surface() {
         let density = scene.triangle_pdf_scale * scene.materials[light.material as usize].emission_weight;
         sample.pdf = nominal_pdf(scene, density, light.probability / sample.pdf, p);
     }
-    if scene.has_light_tree() && probability == 0.0 {
+    if by_tree && probability == 0.0 {
         sample.radiance = Vec3::ZERO;
     }
     sample

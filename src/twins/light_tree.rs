@@ -1,10 +1,11 @@
 //! Twin of `glsl/shared/light_tree.glsl`.
 use crate::layout::{LIGHT_LEAF, LIGHT_SPOT, Light, LightNode};
-use crate::math::hash::{pcg, unit_interval};
+use crate::math::hash::{pcg, unit_interval, word_of_unit};
 use crate::math::octahedral::{octahedral_decode, snorms};
 use crate::scene::Scene;
-use crate::shaders::shared::light::{BELOW_ONE, EVEN_SHARE, MAX_ODDS};
+use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS};
 use crate::shaders::shared::light_tree::{CHILDREN, COSINE_SLACK, LEAST_COSINES, UNIT_STEP};
+use crate::shaders::shared::pcg::BELOW_ONE;
 use glam::Vec3;
 
 /// What light is sampled for.
@@ -100,21 +101,30 @@ pub fn choose_by_tree(scene: &Scene, r: &Receiver, mut u: f32, mut bits: u32) ->
     }
 }
 
-/// The light that `word` chooses with what is left of that word, and the probability of the choice if it is of the tree; 0 if no light can
-/// bring anything.
-pub fn choose_light(scene: &Scene, r: &Receiver, word: u32) -> ((u32, u32), f32) {
+/// A light that a random word chooses.
+#[derive(Clone, Copy, Debug)]
+pub struct Choice {
+    /// Its index.
+    pub light: u32,
+    /// What is left of the word.
+    pub rest: u32,
+    /// The probability of the choice; 0 if no light can bring anything.
+    pub probability: f32,
+}
+
+/// The light that `word` chooses, in a scene with a tree.
+pub fn choose_light(scene: &Scene, r: &Receiver, word: u32) -> Choice {
     let (u, hash, root) = (unit_interval(word), pcg(word), &scene.light_nodes[0]);
     let mut before = root.power;
     if u < before {
         let (light, probability) = choose_by_tree(scene, r, (u / before).min(BELOW_ONE), hash);
-        return ((light, word), before * probability);
+        return Choice { light, rest: word, probability: before * probability };
     }
-    let mut chosen = ((0, word), 0.0);
+    let mut chosen = Choice { light: 0, rest: word, probability: 0.0 };
     for outside in &scene.light_nodes[1..root.child as usize] {
         if outside.power > 0.0 && u >= before {
-            let within = ((u - before) / outside.power).min(BELOW_ONE);
-            let rest = ((within * 16777216.0) as u32) << 8 | hash & 0xff;
-            chosen = ((outside.child & !LIGHT_LEAF, rest), outside.power);
+            let rest = word_of_unit((u - before) / outside.power, hash);
+            chosen = Choice { light: outside.child & !LIGHT_LEAF, rest, probability: outside.power };
         }
         before += outside.power;
     }

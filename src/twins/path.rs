@@ -285,8 +285,8 @@ impl Tracer<'_> {
             if !self.scatter(&mut path, &p, random) || ends {
                 break;
             }
-            let from = self.frame.path.roulette_depth;
-            let roulette = self.effects.roulette && from > 0 && bounce + 1 >= from;
+            let least = self.frame.path.roulette_depth;
+            let roulette = self.effects.roulette && least > 0 && bounce + 1 >= least;
             if roulette && !self.survives_roulette(&mut path, random, pair) {
                 break;
             }

@@ -1,5 +1,6 @@
 //! How bright lamps are where their emission is a picture, as a wall of windows of which few are lit.
 use crate::layout::{Light, MATERIAL_MASKED, NONE, TEXTURE_SHEARED};
+use crate::math::hash::unit_interval;
 use crate::math::srgb::luminance;
 use crate::math::warp::warp_triangle;
 use crate::scene::Scene;
@@ -48,6 +49,6 @@ fn texels(scene: &Scene, image: u32, triangle: u32) -> f32 {
 
 /// Points that are spread evenly over a triangle (Hammersley), by the weights of vertices 1 and 2.
 fn points(count: u32) -> impl Iterator<Item = Vec2> {
-    let unit = |i: u32| (i >> 8) as f32 / 16_777_216.0;
-    (0..count).map(move |i| warp_triangle(vec2((i as f32 + 0.5) / count as f32, unit(i.reverse_bits()))))
+    let point = move |i: u32| vec2((i as f32 + 0.5) / count as f32, unit_interval(i.reverse_bits()));
+    (0..count).map(point).map(warp_triangle)
 }
