@@ -7,56 +7,50 @@ use tallow::layout::{Guide, NONE, vec4};
 /// Around the workgroups' sizes, and one pixel.
 pub const SIZES: [(u32, u32); 7] = [(1, 1), (31, 1), (1, 65), (31, 17), (64, 65), (33, 40), (130, 7)];
 
-pub struct Picture {
-    pub input: FilterInput,
+/// Without noise; a fifth of the columns at the right see nothing.
+pub fn clean(width: u32, height: u32) -> FilterInput {
+    let pixel = |i: u32| {
+        let (x, y) = (i % width, i / width);
+        let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);
+        let light = 0.2 + u * u + if v > 0.5 { 0.5 } else { 0.0 };
+        let floor = v > 0.6;
+        let depth = if floor { 6.0 - 4.0 * v } else { 5.0 + u };
+        let normal = if floor { [0.0, 1.0, 0.0] } else { [0.0, 0.1 * u, 1.0] };
+        let position = [4.0 * u - 2.0, 2.0 - 4.0 * v, -depth];
+        let guide = Guide {
+            normal,
+            depth,
+            position,
+            object: u32::from(floor),
+            albedo: [0.5; 3],
+            material: 0,
+            ..Default::default()
+        };
+        let sky = Guide { object: NONE, material: NONE, ..Guide::default() };
+        ([light, 0.7 * light, 0.4 * light, 4.0], if u > 0.8 { sky } else { guide })
+    };
+    let (radiance, guide) = (0..width * height).map(pixel).unzip();
+    FilterInput { width, height, radiance, guide, variance: None }
 }
 
-impl Picture {
-    /// Without noise; a fifth of the columns at the right see nothing.
-    pub fn new(width: u32, height: u32) -> Self {
-        let pixel = |i: u32| {
-            let (x, y) = (i % width, i / width);
-            let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);
-            let light = 0.2 + u * u + if v > 0.5 { 0.5 } else { 0.0 };
-            let floor = v > 0.6;
-            let depth = if floor { 6.0 - 4.0 * v } else { 5.0 + u };
-            let normal = if floor { [0.0, 1.0, 0.0] } else { [0.0, 0.1 * u, 1.0] };
-            let position = [4.0 * u - 2.0, 2.0 - 4.0 * v, -depth];
-            let guide = Guide {
-                normal,
-                depth,
-                position,
-                object: u32::from(floor),
-                albedo: [0.5; 3],
-                material: 0,
-                ..Default::default()
-            };
-            let sky = Guide { object: NONE, material: NONE, ..Guide::default() };
-            ([light, 0.7 * light, 0.4 * light, 4.0], if u > 0.8 { sky } else { guide })
-        };
-        let (radiance, guide) = (0..width * height).map(pixel).unzip();
-        Self { input: FilterInput { width, height, radiance, guide, variance: None } }
-    }
+/// The same with every pixel on one plane that faces the eye.
+pub fn flat(width: u32, height: u32) -> FilterInput {
+    let wall = Guide { normal: [0.0, 0.0, 1.0], depth: 1.0, position: [0.0, 0.0, -1.0], ..Guide::default() };
+    let guide = vec![wall; (width * height) as usize];
+    FilterInput { guide, ..clean(width, height) }
+}
 
-    /// Every pixel on one plane that faces the eye.
-    pub fn flat(mut self) -> Self {
-        let wall = Guide { normal: [0.0, 0.0, 1.0], depth: 1.0, position: [0.0, 0.0, -1.0], ..Guide::default() };
-        self.input.guide.fill(wall);
-        self
+/// The same with exponential noise of the mean's size, the samples' variance beside it, 1 to 7 samples, and every 13th pixel without.
+pub fn noisy(width: u32, height: u32) -> FilterInput {
+    let mut input = clean(width, height);
+    let mut variance = Vec::new();
+    for (i, c) in input.radiance.iter_mut().enumerate() {
+        variance.push([c[0] * c[0], c[1] * c[1], c[2] * c[2]]);
+        let u = (hash(i as u32) as f32 + 0.5) / 4_294_967_296.0;
+        let scale = -u.max(1e-6).ln();
+        *c = [c[0] * scale, c[1] * scale, c[2] * scale, if i % 13 == 12 { 0.0 } else { (1 + i % 7) as f32 }];
     }
-
-    /// Exponential noise of the mean's size, the samples' variance beside it, 1 to 7 samples, and every 13th pixel without.
-    pub fn noisy(mut self) -> Self {
-        let mut variance = Vec::new();
-        for (i, c) in self.input.radiance.iter_mut().enumerate() {
-            variance.push([c[0] * c[0], c[1] * c[1], c[2] * c[2]]);
-            let u = (hash(i as u32) as f32 + 0.5) / 4_294_967_296.0;
-            let scale = -u.max(1e-6).ln();
-            *c = [c[0] * scale, c[1] * scale, c[2] * scale, if i % 13 == 12 { 0.0 } else { (1 + i % 7) as f32 }];
-        }
-        self.input.variance = Some(variance);
-        self
-    }
+    FilterInput { variance: Some(variance), ..input }
 }
 
 /// What each filter is tested with.
@@ -145,7 +139,7 @@ pub fn apart(a: &[vec4], b: &[vec4], scale: f32) -> f32 {
 
 /// One row of pixels on one plane, without edges.
 pub fn line(values: &[f32]) -> FilterInput {
-    let mut input = Picture::new(values.len() as u32, 1).flat().input;
+    let mut input = flat(values.len() as u32, 1);
     input.radiance = values.iter().map(|v| [*v, *v, *v, if v.is_nan() { 0.0 } else { 1.0 }]).collect();
     input
 }

@@ -335,7 +335,7 @@ fn expected_errors_agree_with_their_twin() {
 #[test]
 fn expected_errors_solve_the_worked_example() {
     let row = |sharp: [f32; 4], sharp_variance: f32, filtered: f32| {
-        let mut input = picture::Picture::new(4, 1).flat().input;
+        let mut input = picture::flat(4, 1);
         input.radiance.fill([2.0, 2.0, 2.0, 4.0]);
         input.variance = Some(vec![[0.04; 3]; 4]);
         let sharp = sharp.map(|v| [v; 3]).to_vec();

@@ -1,5 +1,5 @@
 //! Compares the filters on the device with their CPU twins, and the twins with examples worked by hand.
-use crate::picture::{self, Picture, SIZES, apart, line, red};
+use crate::picture::{self, SIZES, apart, line, red};
 use crate::support::{assert_silent, gpu, hash};
 use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
 use tallow::gpu::{DeviceKind, Gpu};
@@ -10,7 +10,7 @@ fn kernels_agree_with_their_twins() {
     let gpu = gpu();
     for row in FILTERS {
         for (width, height) in SIZES {
-            let input = Picture::new(width, height).noisy().input;
+            let input = picture::noisy(width, height);
             for settings in picture::settings(row.name) {
                 let settings = settings.scaled_to(&input);
                 let (device, _) = run(&gpu, row, &input, &settings).unwrap();
@@ -94,7 +94,7 @@ fn atrous_solves_the_worked_example() {
 fn fireflies_are_cut_and_accounted_for() {
     let gpu = gpu();
     // A lone 9 over a floor of 1 is cut to twice that; two together keep each other.
-    let mut input = Picture::new(20, 6).flat().input;
+    let mut input = picture::flat(20, 6);
     input.radiance.fill([1.0, 1.0, 1.0, 1.0]);
     input.radiance[2 * 20 + 4] = [9.0, 9.0, 9.0, 1.0];
     input.radiance[2 * 20 + 14] = [9.0, 9.0, 9.0, 1.0];
@@ -121,7 +121,7 @@ fn fireflies_are_cut_and_accounted_for() {
         assert!(found.iter().all(|v| (v - kept).abs() < 1e-6), "{values:?}: {found:?}");
     }
 
-    let mut noisy = Picture::new(33, 18).noisy().input;
+    let mut noisy = picture::noisy(33, 18);
     let calm = firefly::removed(&noisy.radiance, &firefly::reference(&noisy, 1.5).radiance).pixels;
     // Three times the deviation: more of it is brought by one sample.
     noisy.variance.iter_mut().flatten().for_each(|v| *v = v.map(|v| 9.0 * v));
@@ -136,7 +136,7 @@ fn fireflies_are_cut_and_accounted_for() {
 
 /// Samples of 1, of which one in `rare` is 300; and in the middle those of a true highlight, 0 or 40. What is cut away of them.
 fn cut_of(spp: u32, rare: u32) -> (firefly::Removed, f32) {
-    let mut input = Picture::new(24, 24).flat().input;
+    let mut input = picture::flat(24, 24);
     let random = |i: usize, k: u32| hash(hash(i as u32) ^ (k + 1));
     let sample = |i: usize, k: u32| match (i == 12 * 24 + 12, random(i, k)) {
         (true, random) => 40.0 * (random % 2) as f64,
@@ -176,7 +176,7 @@ fn what_is_cut_vanishes_with_more_samples() {
 #[test]
 fn the_widest_windows_of_bilateral_are_whole() {
     let gpu = gpu();
-    let input = Picture::new(8, 400).noisy().input;
+    let input = picture::noisy(8, 400);
     let off = f32::INFINITY;
     let settings = FilterSettings::default().with(|s| {
         s.footprint.radius = 399;
@@ -201,7 +201,7 @@ fn the_longest_lines_are_whole() {
     });
     let rows = [("guided", FilterSettings::default()), ("guided", narrow), ("guided", table), ("atrous", narrow)];
     for [width, height] in [[60_000, 1], [1, 60_000]] {
-        let input = Picture::new(width, height).noisy().input;
+        let input = picture::noisy(width, height);
         for (name, settings) in &rows {
             let settings = settings.scaled_to(&input);
             let device = run(&gpu, find(name).unwrap(), &input, &settings).unwrap().0;
@@ -211,7 +211,7 @@ fn the_longest_lines_are_whole() {
         }
     }
     if gpu.info().kind == DeviceKind::Cpu {
-        let wider = run(&gpu, find("none").unwrap(), &Picture::new(60_001, 1).noisy().input, &narrow);
+        let wider = run(&gpu, find("none").unwrap(), &picture::noisy(60_001, 1), &narrow);
         assert!(wider.unwrap_err().to_string().contains("60000 along an edge"));
     }
     assert_silent(&gpu);
@@ -249,7 +249,7 @@ fn bilateral_and_wavelets_solve_the_worked_examples() {
     }
     // Red-black on 3x3 with 8 in the middle, which is red: each black pixel predicts (8 + 0 + 0) / 3 and misses by that,
     // the middle becomes 8 - 4/3 and corners -4/3; on the diagonals the middle is odd and comes back as their mean.
-    let mut input = Picture::new(3, 3).flat().input;
+    let mut input = picture::flat(3, 3);
     input.radiance.fill([0.0, 0.0, 0.0, 1.0]);
     input.radiance[4] = [8.0, 8.0, 8.0, 1.0];
     let square = red(&reference(&input, &plain.with(|s| s.wavelet.basis = WaveletBasis::RedBlack)));
@@ -341,7 +341,7 @@ fn svgf_counts_in_deviations() {
         assert!((red[0] - 0.6).abs() < 1e-6 && (red[1] - 0.4).abs() < 1e-6, "sigma {sigma_l}: {red:?}");
     }
     // A hole that one level does not fill has no variance yet.
-    let mut holed = Picture::new(31, 1).noisy().input;
+    let mut holed = picture::noisy(31, 1);
     holed.radiance[12..24].iter_mut().for_each(|c| c[3] = 0.0);
     both(&gpu, "svgf", &holed, &FilterSettings::default().scaled_to(&holed));
     // Contrast is cut at 1e18: one in a window of 7 has a variance of 1/7 of its square, so that it is one deviation away
@@ -386,7 +386,7 @@ fn auto_trusts_variances_of_two_samples() {
 
 /// A sphere in noisy light of about 2000 from the side, and in light of .1 without noise from all around.
 fn terminator() -> FilterInput {
-    let mut input = Picture::new(32, 32).flat().input;
+    let mut input = picture::flat(32, 32);
     let mut variance = vec![[1e-12; 3]; input.radiance.len()];
     for (i, (c, g)) in input.radiance.iter_mut().zip(&mut input.guide).enumerate() {
         let [x, y] = [i % 32, i / 32].map(|k| (k as f32 - 15.5) / 11.0);

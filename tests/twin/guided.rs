@@ -1,5 +1,5 @@
 //! Compares the guided filter with its twin, which is in double precision, and the twin with examples worked by hand.
-use crate::picture::{Picture, SIZES, apart, line, red};
+use crate::picture::{self, SIZES, apart, line, red};
 use crate::support::kernels::merge;
 use crate::support::{assert_silent, gpu, hash, tuned_gpu};
 use tallow::denoise::filter::{FilterInput, FilterSettings, GuidedSums, find, run};
@@ -63,7 +63,7 @@ fn guided_holds_in_single_precision() {
         for (size, radius, channels) in
             [(size, 3, 4), (size, 12, 4), (size, 60, 4), (size, 12, 3), (size, 12, 1), (long, 100, 4), (tall, 100, 4)]
         {
-            let mut input = Picture::new(size.0, size.1).noisy().input;
+            let mut input = picture::noisy(size.0, size.1);
             for (i, (c, g)) in input.radiance.iter_mut().zip(&mut input.guide).enumerate() {
                 let (x, y) = (i as u32 % size.0, i as u32 / size.0);
                 g.depth = depth[0] + depth[1] * x as f32 + depth[2] * y as f32;
@@ -87,7 +87,7 @@ fn guided_holds_in_single_precision() {
         }
     }
     // Two equal channels and a constant one, with an eps of 0: a matrix of rank 1.
-    let mut input = Picture::new(width, height).noisy().input;
+    let mut input = picture::noisy(width, height);
     input.guide.iter_mut().for_each(|g| g.normal = [g.normal[1], g.normal[1], 0.5]);
     let settings = base.with(|s| {
         s.footprint.radius = 9;
@@ -116,7 +116,7 @@ fn windows_hold_however_threads_share_them() {
     let gpus = [0, 1, 2, 3, 4].map(|windows| tuned_gpu(Tuning { windows, ..Tuning::GPU }));
     for (size, radius) in [((31, 5), 0), ((31, 5), 1), ((65, 33), 7), ((64, 31), 30), ((701, 2), 300), ((2, 701), 300)]
     {
-        let input = Picture::new(size.0, size.1).noisy().input;
+        let input = picture::noisy(size.0, size.1);
         let settings = FilterSettings::default().with(|s| s.footprint.radius = radius);
         let host = (row.reference)(&input, &settings);
         for (windows, gpu) in gpus.iter().enumerate() {
@@ -126,7 +126,7 @@ fn windows_hold_however_threads_share_them() {
     }
     // More windows than an axis of a dispatch has workgroups.
     for (size, radius) in [((70_000, 1), 0), ((70_000, 1), 3), ((1, 70_000), 3)] {
-        let input = Picture::new(size.0, size.1).noisy().input;
+        let input = picture::noisy(size.0, size.1);
         let settings = FilterSettings::default().with(|s| s.footprint.radius = radius);
         let off = apart(&run(&gpus[1], row, &input, &settings).unwrap().0, &(row.reference)(&input, &settings), 1e-3);
         assert!(off < 1e-4, "{size:?}, radius {radius}: {off}");
@@ -149,7 +149,7 @@ fn guided_tables_agree_near_by_and_lose_digits_far_away() {
         apart(&run(&gpu, row, input, &s).unwrap().0, &(row.reference)(input, &s), 1.0)
     };
     for (width, height) in SIZES {
-        let input = Picture::new(width, height).noisy().input;
+        let input = picture::noisy(width, height);
         for s in [
             table,
             table.with(|s| {
@@ -160,7 +160,7 @@ fn guided_tables_agree_near_by_and_lose_digits_far_away() {
             assert!(off(&input, &s) < 2e-3, "{width}x{height}: {}", off(&input, &s));
         }
     }
-    let mut far = Picture::new(70, 50).noisy().input;
+    let mut far = picture::noisy(70, 50);
     (0..).zip(&mut far.guide).for_each(|(i, g)| g.depth = 1e4 + (i % 70) as f32);
     let (table, blocks) = (off(&far, &table), off(&far, &base));
     assert!(table > 100.0 * blocks, "{table}, {blocks}");

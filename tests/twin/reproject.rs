@@ -7,7 +7,10 @@ use crate::twin::Workplace;
 use glam::Vec3;
 use std::path::Path;
 use tallow::gpu::Gpu;
-use tallow::layout::{Camera, FrameConstants, Guide, LightChange, PixelLight, PixelStats, ReprojectPush, SurfacePoint};
+use tallow::layout::{
+    Camera, Effects, FrameConstants, Guide, LightChange, PathConstants, PixelLight, PixelStats, ReprojectPush,
+    SurfacePoint,
+};
 use tallow::math::hash::pcg;
 use tallow::render::pass::light_change::SPACINGS;
 use tallow::render::{Carriage, Carried, Reproject, carried_samples, frame_constants};
@@ -47,18 +50,15 @@ fn push(scene: &Loaded, s: Reproject) -> ReprojectPush {
 type Begun = (Vec<u32>, Vec<(PixelStats, PixelLight)>);
 
 /// By the twin.
-fn by_twin(
-    r: &Reprojection,
-    how: Reproject,
-    handed: &mut Handed,
-    seen: &[Guide],
-    points: &mut [SurfacePoint],
-) -> Begun {
+fn by_twin(r: &Reprojection, how: Reproject, handed: &mut Handed, frame: &FrameConstants) -> Begun {
+    let seen: Vec<Guide> = (0..r.push.pixels).map(|i| guide(r.scene, frame, i)).collect();
+    let mut points: Vec<_> = (0..r.push.pixels).map(|i| point(r.scene, frame, i)).collect();
     if how.reproject == tallow::render::Reprojection::Backward {
-        return r.gather(handed, seen, points).into_iter().map(|(word, stats, light)| (word, (stats, light))).unzip();
+        let gathered = r.gather(handed, &seen, &points);
+        return gathered.into_iter().map(|(word, stats, light)| (word, (stats, light))).unzip();
     }
-    let mut words = r.project(handed, seen, points);
-    let begun = r.carry(handed, &mut words, points);
+    let mut words = r.project(handed, &seen, &points);
+    let begun = r.carry(handed, &mut words, &mut points);
     (words, begun)
 }
 
@@ -73,10 +73,7 @@ fn both(film: &mut Film, scene: &Loaded, settings: Reproject, camera: Camera) ->
     let reprojection = Reprojection { before, scene, instance_now, triangle_now, changes, previous, camera, push };
     let mut handed = reprojection.remember(&left);
     let frame = FrameConstants { camera, ..frame_constants(scene, &scene.settings).unwrap() };
-    let pixels = 0..scene.settings.pixels() as u32;
-    let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
-    let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
-    let twin = by_twin(&reprojection, settings, &mut handed, &seen, &mut points);
+    let twin = by_twin(&reprojection, settings, &mut handed, &frame);
 
     film.begin(camera);
     film.camera = camera;
@@ -84,6 +81,43 @@ fn both(film: &mut Film, scene: &Loaded, settings: Reproject, camera: Camera) ->
     let differ = film.offered().iter().zip(&handed.offered).filter(|(a, b)| a != b).count();
     assert!(differ * 50 <= begun.len(), "{differ} pixels of {} hand on something else", begun.len());
     [(film.carried(), begun), twin]
+}
+
+/// A scene and its constants with the lights of before or `after`, as probes choose among them; `scale` is that of densities before.
+fn with_lights(
+    scene: &Scene,
+    frame: FrameConstants,
+    choice: Option<&Relit>,
+    after: bool,
+    scale: f32,
+) -> (Scene, FrameConstants) {
+    let Some(r) = choice else { return (scene.clone(), frame) };
+    let lights = if after { &r.after } else { &r.before };
+    let (light_count, triangle_pdf_scale) = (lights.len() as u32, scale * r.pdf_scale);
+    let path = PathConstants { light_count, environment: r.environment, triangle_pdf_scale, ..frame.path };
+    let lit = Scene { lights: lights.clone(), light_table: r.table.clone(), ..scene.clone() };
+    (lit, FrameConstants { path, ..frame })
+}
+
+/// How light changes from one pose to the next by the twin of probes.
+fn changes_by_twin(
+    [before, after]: [(&Scene, FrameConstants); 2],
+    choice: Option<&Relit>,
+    effects: Effects,
+    points: &[SurfacePoint],
+    handed: &Handed,
+) -> Vec<LightChange> {
+    let (previous, PathConstants { size, triangle_pdf_scale, .. }) = (before.1.camera, before.1.path);
+    let [old, new] = [(before, false), (after, true)]
+        .map(|((scene, frame), after)| with_lights(scene, frame, choice, after, triangle_pdf_scale));
+    let [old, new] =
+        [&old, &new].map(|(scene, frame)| Tracer { scene, frame: *frame, effects, strategy: Strategy::Both });
+    let probes = light_change::before(&old, &previous, points, &handed.offered);
+    let mut changes = light_change::after(&new, &previous, &handed.records, &probes);
+    for spacing in SPACINGS {
+        changes = light_change::sums(&changes, light_change::probe_cells_of(size), spacing);
+    }
+    changes
 }
 
 /// Brings a scene into another pose and the camera to another place. Returns what pixels begin with, by the kernels and by the twin,
@@ -101,14 +135,10 @@ fn both_where_all_moves(
     let left = Left { guide: &guides, points: &points, stats: &stats, light: &light, carried: &carried };
     let before = scene.scene.clone();
     let seed = pcg(pcg(!film.renderer.settings().seed).wrapping_add(film.renderer.settings().first_sample));
-    let effects = *film.renderer.effects();
     let frame_of = |scene: &Scene, camera: Camera| {
         let frame = frame_constants(scene, film.renderer.settings()).unwrap();
-        FrameConstants { camera, path: tallow::layout::PathConstants { seed, ..frame.path } }
+        FrameConstants { camera, path: PathConstants { seed, ..frame.path } }
     };
-    fn tracer(scene: &Scene, frame: FrameConstants, effects: tallow::layout::Effects) -> Tracer<'_> {
-        Tracer { scene, frame, effects, strategy: Strategy::Both }
-    }
     let previous = film.camera;
     let change = scene.apply(pose).unwrap();
     let flags = [&change.instance_now, &change.triangle_now].map(|now| u32::from(!now.is_empty()));
@@ -118,31 +148,9 @@ fn both_where_all_moves(
         Reprojection { before: &before, scene, instance_now, triangle_now, changes: &[], previous, camera, push };
     let mut handed = leaving.remember(&left);
     let relit = Relit::of(&change.lights_before, scene);
-    let scale = frame_of(&before, previous).path.triangle_pdf_scale;
-    // As probes choose lights.
-    let lit = |scene: &Scene, frame: FrameConstants, after: bool| match &relit {
-        None => (scene.clone(), frame),
-        Some(r) => {
-            let lights = if after { &r.after } else { &r.before };
-            let (light_count, triangle_pdf_scale) = (lights.len() as u32, scale * r.pdf_scale);
-            let path = tallow::layout::PathConstants {
-                light_count,
-                environment: r.environment,
-                triangle_pdf_scale,
-                ..frame.path
-            };
-            let lit = Scene { lights: lights.clone(), light_table: r.table.clone(), ..scene.clone() };
-            (lit, FrameConstants { path, ..frame })
-        }
-    };
-    let (old, old_frame) = lit(&before, frame_of(&before, previous), false);
-    let (new, new_frame) = lit(scene, frame_of(scene, camera), true);
-    let probes = light_change::before(&tracer(&old, old_frame, effects), &previous, &points, &handed.offered);
-    let mut changes = light_change::after(&tracer(&new, new_frame, effects), &previous, &handed.records, &probes);
-    for spacing in SPACINGS {
-        changes = light_change::sums(&changes, light_change::probe_cells_of(push.size), spacing);
-    }
     let frame = frame_of(scene, camera);
+    let poses = [(&before, frame_of(&before, previous)), (&scene.scene, frame)];
+    let changes = changes_by_twin(poses, relit.as_ref(), *film.renderer.effects(), &points, &handed);
     film.record(|renderer, rec| renderer.update(rec, scene, &change));
     film.begin(camera);
     film.camera = camera;
@@ -155,10 +163,7 @@ fn both_where_all_moves(
     let cells = found.iter().zip(&changes).filter(alike).count();
     // Rounding of one path may be in the errors of all cells around: from here on those of the kernels count.
     let reprojection = Reprojection { changes: &found, ..leaving };
-    let pixels = 0..scene.settings.pixels() as u32;
-    let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
-    let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
-    let twin = by_twin(&reprojection, settings, &mut handed, &seen, &mut points);
+    let twin = by_twin(&reprojection, settings, &mut handed, &frame);
 
     ([(film.carried(), begun), twin], cells)
 }

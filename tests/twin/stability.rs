@@ -1,6 +1,6 @@
 //! Checks what every filter must keep to whatever its input: constant images come back, invalid pixels reach no others, and no NaN
 //! comes out. Every check runs over every row of the table of filters, on the device and on its twin.
-use crate::picture::{self, Picture};
+use crate::picture;
 use crate::support::{assert_silent, gpu, hash};
 use tallow::denoise::filter::{AtrousForm, FILTERS, FilterInput, FilterSettings, Row, find, run};
 use tallow::gpu::Gpu;
@@ -58,7 +58,7 @@ fn reached(output: &[vec4]) -> Vec<bool> {
 }
 
 fn constant(width: u32, height: u32, value: f32) -> FilterInput {
-    let mut input = Picture::new(width, height).input;
+    let mut input = picture::clean(width, height);
     let [r, g, b] = TINT.map(|tint| tint * value);
     input.radiance.fill([r, g, b, 1.0]);
     input.variance = Some(vec![[0.0; 3]; input.radiance.len()]);
@@ -161,7 +161,7 @@ fn one_known_pixel_is_all_there_is() {
 fn no_nan_leaves_a_filter() {
     let gpu = gpu();
     for row in FILTERS {
-        let mut input = Picture::new(35, 20).noisy().input;
+        let mut input = picture::noisy(35, 20);
         let values = [0.0, 1e-38, 1e-30, 65504.0, 1e20, 3e38, -1.0, -3e38];
         for (i, c) in input.radiance.iter_mut().enumerate().filter(|(i, _)| i % 3 == 0) {
             *c = [values[i / 3 % 8], values[i / 24 % 8], values[i % 8], [1.0, 4.0][i / 3 % 2]];
@@ -284,7 +284,7 @@ fn bumps_stay() {
 #[test]
 fn a_sigma_of_zero_leaves_an_image_as_it_is() {
     let gpu = gpu();
-    let mut input = Picture::new(33, 18).noisy().input;
+    let mut input = picture::noisy(33, 18);
     input.radiance.iter_mut().for_each(|c| c[3] = 4.0);
     let zero = FilterSettings::default()
         .with(|s| {
@@ -373,7 +373,7 @@ fn mean(pixels: &[vec4]) -> f64 {
 fn energy_is_kept() {
     let gpu = gpu();
     let row = find("atrous").unwrap();
-    let mut input = Picture::new(96, 80).noisy().input;
+    let mut input = picture::noisy(96, 80);
     input.radiance.iter_mut().for_each(|c| c[3] = 4.0);
     let narrow = FilterSettings::default().with(|s| s.edge.sigma_rt = 0.05).scaled_to(&input);
     let ratio = |s: &FilterSettings| mean(&run(&gpu, row, &input, s).unwrap().0) / mean(&input.radiance);
