@@ -4,6 +4,9 @@ use std::path::{Path, PathBuf};
 /// Result of operations that can fail for a reason outside the program.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// Result of what fails with a sentence that says what is wrong, to which the caller adds where.
+pub(crate) type Checked<T = ()> = std::result::Result<T, String>;
+
 /// The kinds of errors, distinguished by what can be done about them. [`Error::exit_code`] is the command line's exit code.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

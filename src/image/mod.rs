@@ -15,7 +15,7 @@ mod sorted_head;
 pub mod source;
 pub mod tone;
 
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::memory;
 pub use claim::Claim;
 pub use film::{Channel, FILTERED, Film, NOISY, Picture, SOFTWARE, Samples, Window};
@@ -126,7 +126,7 @@ pub(crate) fn read_head(path: &Path) -> Result<Film> {
 ///
 /// # Errors
 /// One line that says what is wrong with the data, or that they need more memory than is free.
-pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
+pub fn decode(bytes: &[u8]) -> Checked<Film> {
     memory::check(claim_of(bytes, Frame::Display)?.bytes)?;
     decode_claimed(bytes)
 }
@@ -135,7 +135,7 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
 ///
 /// # Errors
 /// One line that says what is wrong with it.
-pub(crate) fn claim(bytes: &[u8]) -> std::result::Result<Claim, String> {
+pub(crate) fn claim(bytes: &[u8]) -> Checked<Claim> {
     claim_of(bytes, Frame::Display)
 }
 
@@ -166,12 +166,12 @@ pub fn check_memory(path: &Path, bytes: u64) -> Result<()> {
     memory::check(bytes).map_err(|what| Error::Memory(format!("{}: {what}", path.display())))
 }
 
-fn claim_of(bytes: &[u8], frame: Frame) -> std::result::Result<Claim, String> {
+fn claim_of(bytes: &[u8], frame: Frame) -> Checked<Claim> {
     contained(|| if is_exr(bytes) { exr::claim(bytes, frame) } else { photo::claim(bytes) })
 }
 
 /// Decodes a file. It must be called only after [`claim_of`] has accepted it.
-fn decode_claimed(bytes: &[u8]) -> std::result::Result<Film, String> {
+fn decode_claimed(bytes: &[u8]) -> Checked<Film> {
     contained(|| if is_exr(bytes) { exr::decode(bytes) } else { photo::decode(bytes) })
 }
 
@@ -199,7 +199,7 @@ pub fn is_decoding() -> bool {
 ///
 /// # Errors
 /// The decoder's error in one line, or that it panicked.
-pub fn contained<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std::result::Result<T, String> {
+pub fn contained<T>(decode: impl FnOnce() -> Checked<T>) -> Checked<T> {
     DECODING.set(true);
     let result = catch_unwind(AssertUnwindSafe(decode));
     DECODING.set(false);

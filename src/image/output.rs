@@ -1,7 +1,7 @@
 //! Writing of files. A file appears complete or not at all, and one that is replaced keeps its owner and mode.
 mod temporary;
 
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use std::fs::Metadata;
 use std::io::{BufWriter, Cursor, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -84,7 +84,7 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-fn check_file(path: &Path) -> std::result::Result<(), String> {
+fn check_file(path: &Path) -> Checked {
     let target = resolve(path).map_err(|e| remedy(path, &e))?;
     replaceable(&target)?;
     Temporary::new_in(folder(&target)).map(drop).map_err(|e| remedy(path, &e))
@@ -99,10 +99,7 @@ fn write_through(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Res
     file.flush()
 }
 
-fn write_renamed(
-    path: &Path,
-    fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>,
-) -> std::result::Result<(), String> {
+fn write_renamed(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> Checked {
     let target = resolve(path).map_err(|e| remedy(path, &e))?;
     let old = replaceable(&target)?;
     let written = filled(folder(&target), old, fill).and_then(|file| file.replace(&target));
@@ -127,7 +124,7 @@ fn filled(
 }
 
 /// Returns the metadata of the file that would be replaced, if there is one.
-fn replaceable(target: &Path) -> std::result::Result<Option<Metadata>, String> {
+fn replaceable(target: &Path) -> Checked<Option<Metadata>> {
     let Ok(old) = std::fs::symlink_metadata(target) else { return Ok(None) };
     if old.is_dir() {
         return Err(remedy(target, &ErrorKind::IsADirectory.into()));

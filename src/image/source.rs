@@ -2,7 +2,7 @@
 use super::film::{Channel, Film, Picture};
 use super::frame::{self, Frame};
 use super::{Claim, exr, primaries};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use ::exr::image::FlatImage;
 use ::exr::meta::attribute::IntegerBounds;
 use std::io::Cursor;
@@ -104,7 +104,7 @@ impl Source {
         encoded.map_err(|what| Error::input(&self.path, what))
     }
 
-    fn as_exr(&self) -> std::result::Result<(Film, FlatImage), String> {
+    fn as_exr(&self) -> Checked<(Film, FlatImage)> {
         let mut encoded = Cursor::new(Vec::new());
         exr::encode(&self.film, &mut encoded).map_err(|e| e.to_string())?;
         exr::decode_parts(encoded.get_ref())
@@ -115,7 +115,7 @@ impl Source {
     }
 
     /// The rectangles that are stored and shown.
-    fn frames(&self) -> std::result::Result<[IntegerBounds; 2], String> {
+    fn frames(&self) -> Checked<[IntegerBounds; 2]> {
         let Film { width, height, .. } = self.film;
         match super::is_exr(&self.bytes) {
             true => exr::frames(&self.bytes),
@@ -125,11 +125,7 @@ impl Source {
 }
 
 /// The samples of a channel, or the new ones, in the rectangle that is shown; 0 where the file stores none.
-fn shown_samples(
-    channel: &Channel,
-    replaced: &Replaced,
-    [stored, shown]: [IntegerBounds; 2],
-) -> std::result::Result<Vec<f32>, String> {
+fn shown_samples(channel: &Channel, replaced: &Replaced, [stored, shown]: [IntegerBounds; 2]) -> Checked<Vec<f32>> {
     let fresh = replaced.iter().find(|(name, _)| *name == channel.name);
     let samples = fresh.map_or_else(|| channel.samples.to_f32(), |(_, samples)| (*samples).into());
     match channel.window {

@@ -4,15 +4,13 @@ use super::build::attributes::words_of;
 use super::build::bvh;
 use super::build::coat::reads_table;
 use super::{Environment, Scene};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::layout::{
     AliasEntry, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_LEAF, LightNode, Material, NONE, SPHERE, Shading,
     TRAVERSAL_STACK, Texture, Triangle,
 };
 use crate::shaders::shared::light_tree::CHILDREN;
 use glam::Vec3;
-
-type Checked = std::result::Result<(), String>;
 
 /// The kind of tree that a node belongs to, if any.
 #[derive(Clone, Copy, PartialEq)]

@@ -3,7 +3,7 @@ use super::curve::Curve;
 use super::frames::Frames;
 use super::keyed::{Keyed, Target, parts};
 use super::{Animation, Mover};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::scene::Scene;
 use crate::scene::description::{
     self, AnimationTable, Camera, Description, Interpolation, mesh_number, meshes_to_free, numbered, rotation,
@@ -14,8 +14,6 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
-
-type Checked<T> = std::result::Result<T, String>;
 
 /// The description whose meshes are stored apart where an animation moves them.
 pub fn with_freed_meshes(description: &Description) -> Cow<'_, Description> {
@@ -161,7 +159,7 @@ fn add(
     keys: Vec<(f64, Vec<f64>)>,
     interpolation: Interpolation,
     curves: &mut Vec<(&'static str, Curve)>,
-) -> Checked<()> {
+) -> Checked {
     if name == "rotate" {
         let turned = |(time, v): &(f64, Vec<f64>)| Ok((*time, rotation(v)?.to_array().to_vec()));
         let keys = keys.iter().map(turned).collect::<Checked<Vec<_>>>()?;
@@ -184,7 +182,7 @@ fn add(
 }
 
 /// Checks that a key says what the target has, in as many numbers.
-fn check(key: &Key, target: &Target) -> Checked<()> {
+fn check(key: &Key, target: &Target) -> Checked {
     let channels = target.channels();
     for (name, numbers) in &key.values {
         let Some((_, counts)) = channels.iter().find(|(known, _)| known == name) else {

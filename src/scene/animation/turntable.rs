@@ -1,6 +1,6 @@
 //! A camera that goes around what it looks at.
 use super::Mover;
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::layout;
 use crate::scene::Scene;
 use crate::scene::description::Camera;
@@ -37,7 +37,7 @@ impl Turntable {
         if depth > 0.0 { position + forward * depth } else { middle }
     }
 
-    fn turned(&self, camera: &Camera, angle: f64) -> std::result::Result<Camera, String> {
+    fn turned(&self, camera: &Camera, angle: f64) -> Checked<Camera> {
         let built = camera.build(self.size, self.bounds)?;
         let pivot = camera.target.map_or_else(|| self.pivot(&built), DVec3::from);
         let around = camera.up.and_then(|up| DVec3::from(up).try_normalize()).unwrap_or(DVec3::Y);

@@ -1,5 +1,6 @@
 //! What a scene becomes by a pose, found and checked before anything is changed.
 use super::material::changed;
+use crate::error::Checked;
 use crate::layout::{
     Instance, LIGHT_ENVIRONMENT, Light, MATERIAL_MASKED, Material, NONE, SPHERE, SPHERE_INWARD, Triangle,
 };
@@ -14,8 +15,6 @@ use crate::scene::pose::{EnvironmentChange, Pose, Vertices};
 use crate::scene::{Fingerprint, Scene};
 use glam::{DAffine3, DMat3, Vec3};
 use std::collections::HashSet;
-
-type Checked<T> = Result<T, String>;
 
 /// What is new: what a pose names that is as it was is left out, so that nothing counts as changed that is at rest.
 #[derive(Default)]
@@ -90,7 +89,7 @@ impl Next {
 }
 
 /// The vertices of a mesh are put in the order that its hierarchy has before the pose: a second time, that may be another.
-fn each_once(meshes: impl Iterator<Item = usize>) -> Checked<()> {
+fn each_once(meshes: impl Iterator<Item = usize>) -> Checked {
     let mut seen = HashSet::new();
     match meshes.into_iter().find(|mesh| !seen.insert(*mesh)) {
         Some(mesh) => Err(format!("mesh {mesh} is posed twice: keep one")),
@@ -158,7 +157,7 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
 }
 
 /// Checks what only now emits light or has holes, which the scene could not know when it chose spheres or meshes.
-fn new_lamps_hold(scene: &Scene, next: Option<&NextCopies>, materials: &[Material]) -> Checked<()> {
+fn new_lamps_hold(scene: &Scene, next: Option<&NextCopies>, materials: &[Material]) -> Checked {
     let newly = |(m, before): (&Material, &Material)| {
         let lit = m.emission != [0.0; 3];
         lit && (before.emission == [0.0; 3] || m.flags & MATERIAL_MASKED > before.flags & MATERIAL_MASKED)
@@ -186,7 +185,7 @@ fn copies(scene: &Scene) -> Vec<Instance> {
 }
 
 /// [`sphere_shines`] for all triangles of a copy.
-fn spheres_shine(scene: &Scene, copy: u32, at: &Instance, materials: &[Material]) -> Checked<()> {
+fn spheres_shine(scene: &Scene, copy: u32, at: &Instance, materials: &[Material]) -> Checked {
     let even = is_even(&DAffine3::from_mat4(bvh::world_from_object(at).as_dmat4()));
     let tree = &scene.rig.trees[scene.rig.tree_of[copy as usize] as usize];
     let worn = |triangle: &Triangle| if at.material == NONE { triangle.material } else { at.material };
@@ -194,7 +193,7 @@ fn spheres_shine(scene: &Scene, copy: u32, at: &Instance, materials: &[Material]
 }
 
 /// Lamps are sampled where they are hit: a sphere as one of even radiance that shines outward.
-fn sphere_shines(triangle: &Triangle, even: bool, worn: &Material) -> Checked<()> {
+fn sphere_shines(triangle: &Triangle, even: bool, worn: &Material) -> Checked {
     if triangle.primitive & SPHERE == 0 || worn.emission == [0.0; 3] {
         return Ok(());
     }

@@ -6,7 +6,7 @@
 //! first and last lie on the poles: half a texel apart at most).
 use super::alias;
 use super::sources::Sources;
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::image::Picture;
 use crate::layout::{LIGHT_ENVIRONMENT, Light, NONE};
 use crate::math::srgb::luminance;
@@ -89,7 +89,7 @@ pub fn from_picture(
     picture: &Picture,
     brightest: f32,
     warn: &mut Vec<String>,
-) -> std::result::Result<Option<Environment>, String> {
+) -> Checked<Option<Environment>> {
     let &Picture { width, height, ref pixels } = picture;
     if pixels.is_empty() || pixels.len() != width as usize * height as usize {
         return Err(format!("it has {} pixels for {width} x {height}", pixels.len()));
@@ -156,7 +156,7 @@ pub fn mean_luminance(e: &Environment) -> f64 {
 ///
 /// # Errors
 /// When the nine numbers are no rotation.
-pub fn rotation(degrees: f64, matrix: Option<[f64; 9]>) -> std::result::Result<DMat3, String> {
+pub fn rotation(degrees: f64, matrix: Option<[f64; 9]>) -> Checked<DMat3> {
     let Some(rows) = matrix else { return Ok(DMat3::from_rotation_y(degrees.to_radians())) };
     let m = DMat3::from_cols_array(&rows).transpose();
     match (m * m.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-3) && m.is_finite() {

@@ -5,7 +5,7 @@ use super::plan::{Job, Plan};
 use super::soft;
 use super::sources::Sources;
 use super::store::Stored;
-use crate::error::Result;
+use crate::error::{Checked, Result};
 use crate::layout::{Instance, NONE, TRAVERSAL_STACK};
 use crate::memory;
 use crate::scene::rig::Tree;
@@ -158,12 +158,7 @@ fn top_level(sources: &Sources, scene: &mut Scene) -> Result<()> {
 ///
 /// # Errors
 /// A sentence, where that is too far.
-pub fn reach(
-    bounds: &[Bounds],
-    tree_of: &[u32],
-    hidden: &HashSet<u32>,
-    copies: &[Instance],
-) -> std::result::Result<Bounds, String> {
+pub fn reach(bounds: &[Bounds], tree_of: &[u32], hidden: &HashSet<u32>, copies: &[Instance]) -> Checked<Bounds> {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for (number, copy) in (0..).zip(copies).filter(|(number, _)| !hidden.contains(number)) {
         let [l, h] = bvh::world_bounds(copy, bounds[tree_of[number as usize] as usize]).map(Vec3::from);

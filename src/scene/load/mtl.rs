@@ -2,7 +2,7 @@
 //! spaces. What the statements mean for a material is decided in `mtl_material.rs`.
 use super::blocks::Statements;
 use super::mapping::Mapping;
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::scene::description::texture::Wrap;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -141,7 +141,7 @@ pub fn unread(text: &str) -> Vec<String> {
 }
 
 /// A statement as tobj reads it, with a line feed; nothing for one that means nothing here.
-fn statement(key: &str, rest: &str) -> std::result::Result<String, String> {
+fn statement(key: &str, rest: &str) -> Checked<String> {
     let Some(&(lower, name, kind)) = STATEMENTS.iter().find(|(lower, ..)| lower.eq_ignore_ascii_case(key)) else {
         return Ok(String::new());
     };
@@ -162,7 +162,7 @@ fn statement(key: &str, rest: &str) -> std::result::Result<String, String> {
     })
 }
 
-fn number(key: &str, rest: &str) -> std::result::Result<f32, String> {
+fn number(key: &str, rest: &str) -> Checked<f32> {
     let word = rest.split_whitespace().next().unwrap_or("");
     match word.parse::<f32>() {
         Ok(v) if v.is_finite() => Ok(v),
@@ -171,7 +171,7 @@ fn number(key: &str, rest: &str) -> std::result::Result<f32, String> {
 }
 
 /// Three numbers, or one for all channels. `spectral` and `xyz` forms have no meaning here.
-fn color(key: &str, rest: &str) -> std::result::Result<[f32; 3], String> {
+fn color(key: &str, rest: &str) -> Checked<[f32; 3]> {
     let words: Vec<_> = rest.split_whitespace().take(3).collect();
     match words[..] {
         [_] => number(key, rest).map(|v| [v; 3]),

@@ -2,9 +2,9 @@
 use super::blocks::Blocks;
 use super::few;
 use super::library::{self, Library};
-use super::obj_block::{Checked, Indices, NO_INDEX, ObjBlock, Statement};
+use super::obj_block::{Indices, NO_INDEX, ObjBlock, Statement};
 use super::obj_part::{Corner, NO_EXTRA, Numbering, Part, PartBuilder};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::image::input;
 use crate::layout::NONE;
 use crate::memory;
@@ -185,7 +185,7 @@ impl<'a> Parser<'a> {
     }
 
     /// The corners of a face have the texture coordinates (normals) that all of them have, or none.
-    fn face(&mut self, line: usize, written: &[Indices], defined: [i64; 3]) -> Checked<()> {
+    fn face(&mut self, line: usize, written: &[Indices], defined: [i64; 3]) -> Checked {
         self.corners.clear();
         for indices in written {
             self.corners.push(corner(indices, defined)?);

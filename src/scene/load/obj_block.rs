@@ -1,8 +1,6 @@
 //! A block of an OBJ file by itself: numbers are read, but what they refer to may lie in blocks before it.
 use super::blocks::Statements;
-
-/// The value that a statement holds, or a sentence about what is wrong with it.
-pub type Checked<T> = std::result::Result<T, String>;
+use crate::error::Checked;
 
 /// Indices as a face writes them of a position, a texture coordinate and a normal, or [`NO_INDEX`].
 pub type Indices = [i64; 3];
@@ -58,7 +56,7 @@ impl ObjBlock {
     }
 
     /// Statements that a path tracer does not need, such as lines and points, are skipped.
-    fn statement(&mut self, line: u32, text: &str) -> Checked<()> {
+    fn statement(&mut self, line: u32, text: &str) -> Checked {
         let text = text.trim_ascii_start();
         let (key, rest) = text.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((text, ""));
         let name = || rest.trim().to_owned();
@@ -90,7 +88,7 @@ impl ObjBlock {
     }
 
     /// A fourth number is a weight that the others are divided by; five numbers or more end in a colour, which is dropped.
-    fn vertex(&mut self, rest: &str) -> Checked<()> {
+    fn vertex(&mut self, rest: &str) -> Checked {
         let what = "a vertex needs three numbers after v";
         let mut position = numbers(rest, what)?;
         let mut more = rest.split_ascii_whitespace().skip(3);

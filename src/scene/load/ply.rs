@@ -7,7 +7,7 @@ use super::library::Library;
 use super::obj::ObjFile;
 use super::obj_part::{Numbering, Part};
 use super::triangulate::Triangulator;
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::image::{contained, input};
 use crate::math::srgb::linear_from_srgb;
 use crate::memory;
@@ -19,9 +19,6 @@ use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, Pro
 use std::borrow::Cow;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-
-/// The value, or a sentence about what is wrong with the file.
-type Checked<T> = std::result::Result<T, String>;
 
 /// Bytes of a vertex, and of a face of three or four corners, as read and as a part of the mesh.
 const BYTES_OF_VERTEX: u64 = 2 * 48;
@@ -86,7 +83,7 @@ fn parse(
 }
 
 /// Compares the header with the bytes that there can be: every property of an element takes at least one.
-fn check(header: &Header, size: u64) -> Checked<()> {
+fn check(header: &Header, size: u64) -> Checked {
     for (name, element) in &header.elements {
         let least = (element.count as u64).saturating_mul(element.properties.len().max(1) as u64);
         if least > size {

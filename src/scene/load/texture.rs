@@ -4,7 +4,7 @@ mod source;
 
 use super::find::find_file;
 use super::mapping::Mapping;
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::image::contained;
 use crate::layout::{NONE, TEXTURE_FLOAT, TEXTURE_RGB9E5, TEXTURE_SRGB, Texture};
 use crate::math::rgb9e5;
@@ -101,7 +101,7 @@ impl TextureSet {
     ///
     /// # Errors
     /// A sentence that says what is wrong with it.
-    pub fn add_bitmap(&mut self, bitmap: &Bitmap) -> std::result::Result<(), String> {
+    pub fn add_bitmap(&mut self, bitmap: &Bitmap) -> Checked {
         let &Bitmap { width, height, ref rgba, .. } = bitmap;
         check_size(width, height)?;
         if rgba.len() != width as usize * height as usize {
@@ -237,7 +237,7 @@ fn damaged(path: &Path, what: String) -> Error {
     Error::input(path, format!("is no usable picture ({what}): save it again as PNG, JPEG or EXR"))
 }
 
-fn check_size(width: u32, height: u32) -> std::result::Result<(), String> {
+fn check_size(width: u32, height: u32) -> Checked {
     match [width, height].iter().all(|n| (1..=1 << 16).contains(n)) {
         true => Ok(()),
         false => Err(format!("is {width} x {height} texels: 1 to 65536 each way can be used")),

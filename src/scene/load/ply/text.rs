@@ -1,5 +1,6 @@
 //! Rows of PLY files of text. The crate's grammar of numbers knows neither `.5` nor `1.` nor `nan`, which C programs write and read.
-use super::{Checked, short};
+use super::short;
+use crate::error::Checked;
 use ply_rs_bw::ply::{ElementDef, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
 use std::io::BufRead;
 use std::str::{FromStr, SplitAsciiWhitespace};

@@ -1,6 +1,6 @@
 //! Pictures that are still to be decoded, and how their texels are filled.
 use super::{Kind, check_size, damaged};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::image::{BAND, bands, check_end, claim, decode, has_16_bits, holds_floats, input, picture};
 use crate::layout::TEXTURE_FLOAT;
 use crate::scene::description::mesh::Bitmap;
@@ -57,7 +57,7 @@ impl Source {
     ///
     /// # Errors
     /// What is wrong with the picture.
-    pub fn decode(self, kind: Kind, space: &mut [u32]) -> std::result::Result<(), String> {
+    pub fn decode(self, kind: Kind, space: &mut [u32]) -> Checked {
         let deep = matches!(self, Self::Deep(..)) && kind.is_number();
         let (bytes, size) = match self {
             Self::Bitmap(bitmap) => {
@@ -112,7 +112,7 @@ fn is_idle<T: PartialEq>([r, g, b, alpha]: [T; 4], full: T) -> bool {
     alpha == full && r == g && g == b
 }
 
-fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> std::result::Result<(), String> {
+fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> Checked {
     let film = decode(bytes)?;
     if [film.width, film.height] != size {
         return Err("its header says another size".to_owned());
