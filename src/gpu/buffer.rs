@@ -161,12 +161,13 @@ impl<T: Pod> Buffer<T> {
         Self::for_texels(gpu, name, values.len(), 16)?.holding(values)
     }
 
-    /// Makes a [`Location::Device`] buffer of `len` elements with undefined contents, whose texels are as wide as this one's.
+    /// Makes a [`Location::Device`] buffer of `len` elements with undefined contents, with this one's name and as wide texels.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn larger(&self, gpu: &Gpu, name: &str, len: usize) -> Result<Self> {
-        Self::for_texels(gpu, name, len, self.untyped.texel)
+    pub fn larger(&self, len: usize) -> Result<Self> {
+        let Untyped { gpu, name, texel, .. } = &*self.untyped;
+        Self::for_texels(gpu, name, len, *texel)
     }
 
     fn for_texels(gpu: &Gpu, name: &str, len: usize, texel: u64) -> Result<Self> {

@@ -5,7 +5,7 @@ use super::push::{frame_constants, priority_push};
 use super::renderer::{Renderer, called_for};
 use super::upload::{parts, whole};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, Recorder};
+use crate::gpu::Recorder;
 use crate::layout::{Effect, Effects};
 use crate::scene::{Change, Scene, keeps_soft_light_apart, light_and_camera_effects};
 
@@ -44,7 +44,7 @@ impl Renderer {
         if !change.is_of_camera_alone() {
             self.remember(rec, scene, change)?;
         }
-        upload(&self.gpu, rec, &mut self.frame.scene, scene, change)?;
+        upload(rec, &mut self.frame.scene, scene, change)?;
         self.frame.constants = constants;
         self.frame.priority_push = priority_push(scene, &self.settings);
         self.soft_lights = scene.has_soft_lights();
@@ -65,7 +65,7 @@ impl Renderer {
         if history.has_changed() {
             return rec.fill(&history.offered, 0); // nothing is handed on
         }
-        history.note(&self.gpu, rec, (scene, change), &self.frame.constants.path, self.settings.first_sample)?;
+        history.note(rec, (scene, change), &self.frame.constants.path, self.settings.first_sample)?;
         frame::record_change(rec, &self.frame)
     }
 
@@ -83,9 +83,10 @@ impl Renderer {
 
     fn check_effects(&self, scene: &Scene, change: &Change) -> Result<()> {
         // Whether surfaces call for something takes a look at all of them.
-        let called = match change.materials || !change.triangles.is_empty() {
-            true => called_for(scene, &self.settings, self.outputs),
-            false => light_and_camera_effects(scene),
+        let called = if change.materials || !change.triangles.is_empty() {
+            called_for(scene, &self.settings, self.outputs)
+        } else {
+            light_and_camera_effects(scene)
         };
         // Where light is not split, what is soft of it makes no difference.
         let soft_light = self.effects.split_light && keeps_soft_light_apart(scene, &self.settings);
@@ -103,29 +104,29 @@ impl Renderer {
     }
 }
 
-fn upload(gpu: &Gpu, rec: &mut Recorder, to: &mut DeviceScene, scene: &Scene, change: &Change) -> Result<()> {
+fn upload(rec: &mut Recorder, to: &mut DeviceScene, scene: &Scene, change: &Change) -> Result<()> {
     // A top level has at most as many nodes as it has instances; the rest of the nodes only changes when a mesh is built anew.
     let spare = scene.instances.len();
-    parts(gpu, rec, "nodes", &mut to.nodes, &scene.nodes, &change.nodes, spare)?;
-    parts(gpu, rec, "triangles", &mut to.triangles, &scene.triangles, &change.triangles, 0)?;
+    parts(rec, &mut to.nodes, &scene.nodes, &change.nodes, spare)?;
+    parts(rec, &mut to.triangles, &scene.triangles, &change.triangles, 0)?;
     // Kernels that read no shading have none of it, and others what the scene has.
     if !scene.shading.is_empty() && to.shading.len() == scene.triangles.len() {
-        parts(gpu, rec, "shading", &mut to.shading, &scene.shading, &change.triangles, 0)?;
+        parts(rec, &mut to.shading, &scene.shading, &change.triangles, 0)?;
     }
     if change.instances {
-        whole(gpu, rec, "instances", &mut to.instances, &scene.instances)?;
+        whole(rec, &mut to.instances, &scene.instances)?;
     }
     if change.materials {
-        whole(gpu, rec, "materials", &mut to.materials, &scene.materials)?;
+        whole(rec, &mut to.materials, &scene.materials)?;
     }
-    parts(gpu, rec, "texels of textures", &mut to.texels, &scene.texels, &change.texels, 0)?;
+    parts(rec, &mut to.texels, &scene.texels, &change.texels, 0)?;
     if let Some(world) = &to.world {
         world.update(rec, scene, &to.triangles, change)?;
     }
     if change.lights {
-        whole(gpu, rec, "lights", &mut to.lights, &scene.lights)?;
-        whole(gpu, rec, "light_table", &mut to.light_table, &scene.light_table)?;
-        whole(gpu, rec, "light_nodes", &mut to.light_nodes, &scene.light_nodes)?;
+        whole(rec, &mut to.lights, &scene.lights)?;
+        whole(rec, &mut to.light_table, &scene.light_table)?;
+        whole(rec, &mut to.light_nodes, &scene.light_nodes)?;
     }
     Ok(())
 }

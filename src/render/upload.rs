@@ -1,6 +1,6 @@
 //! Uploads of arrays that change from frame to frame.
 use crate::error::Result;
-use crate::gpu::{Buffer, Gpu, Recorder};
+use crate::gpu::{Buffer, Recorder};
 use bytemuck::Pod;
 use std::ops::Range;
 
@@ -8,8 +8,8 @@ use std::ops::Range;
 ///
 /// # Errors
 /// [`Error::Device`](crate::error::Error::Device).
-pub fn whole<T: Pod>(gpu: &Gpu, rec: &mut Recorder, name: &str, to: &mut Buffer<T>, values: &[T]) -> Result<()> {
-    parts(gpu, rec, name, to, values, std::slice::from_ref(&(0..values.len())), values.len() / 4)
+pub fn whole<T: Pod>(rec: &mut Recorder, to: &mut Buffer<T>, values: &[T]) -> Result<()> {
+    parts(rec, to, values, std::slice::from_ref(&(0..values.len())), values.len() / 4)
 }
 
 /// Uploads the parts of an array that changed, or all of it where it has outgrown its buffer: to a new one with room for `spare`
@@ -18,9 +18,7 @@ pub fn whole<T: Pod>(gpu: &Gpu, rec: &mut Recorder, name: &str, to: &mut Buffer<
 /// # Errors
 /// [`Error::Device`](crate::error::Error::Device).
 pub fn parts<T: Pod>(
-    gpu: &Gpu,
     rec: &mut Recorder,
-    name: &str,
     to: &mut Buffer<T>,
     values: &[T],
     changed: &[Range<usize>],
@@ -30,7 +28,7 @@ pub fn parts<T: Pod>(
         return Ok(());
     }
     if values.len() > to.len() {
-        *to = to.larger(gpu, name, values.len() + spare)?;
+        *to = to.larger(values.len() + spare)?;
         return rec.upload(to, &[(0, values)]);
     }
     let parts = joined(changed, values.len());

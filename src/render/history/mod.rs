@@ -136,12 +136,12 @@ impl History {
         let info = gpu.info();
         let words = info.max_storage_range / size_of::<u32>() as u64;
         let most = words.min(MOST_PIXELS.min(most_of_one_tile(info)).into());
-        match u64::from(pixels) > most {
-            true => Err(Error::Usage(format!(
+        if u64::from(pixels) > most {
+            return Err(Error::Usage(format!(
                 "a film of {pixels} pixels is too large to reproject on this device: choose at most {most} pixels"
-            ))),
-            false => Ok(()),
+            )));
         }
+        Ok(())
     }
 
     /// For a film of `size` pixels, which get `spp` samples a frame. `stack` is [`crate::scene::Scene::stack`].
@@ -186,7 +186,6 @@ impl History {
     /// Gets ready for a change of more than the camera, after a frame of these constants and this first sample.
     pub(super) fn note(
         &mut self,
-        gpu: &Gpu,
         rec: &mut Recorder,
         (scene, change): (&Scene, &Change),
         c: &PathConstants,
@@ -194,9 +193,9 @@ impl History {
     ) -> Result<()> {
         self.changed.store(true, Relaxed);
         let Some(probes) = &mut self.probes else { return Ok(()) };
-        self.numbers.note(gpu, rec, change)?;
+        self.numbers.note(rec, change)?;
         let relit = change.lights.then(|| Relit::of(&change.lights_before, scene)).flatten();
-        probes.note(gpu, rec, relit.as_ref(), c, first_sample)
+        probes.note(rec, relit.as_ref(), c, first_sample)
     }
 
     /// Whether more than the camera has changed since the last frame.

@@ -30,12 +30,12 @@ impl Numbers {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn note(&mut self, gpu: &Gpu, rec: &mut Recorder, change: &Change) -> Result<()> {
+    pub fn note(&mut self, rec: &mut Recorder, change: &Change) -> Result<()> {
         let now = [&change.instance_now, &change.triangle_now];
         self.anew = now.map(|now| !now.is_empty());
         for (to, now) in [&mut self.instance_now, &mut self.triangle_now].into_iter().zip(now) {
             if !now.is_empty() {
-                whole(gpu, rec, "numbers now", to, now)?;
+                whole(rec, to, now)?;
             }
         }
         Ok(())

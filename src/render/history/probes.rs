@@ -43,15 +43,15 @@ impl Probes {
         let cells = size.map(|n| n.div_ceil(PROBE_CELL));
         let count = (cells[0] * cells[1]) as usize;
         let changes = || Buffer::new(gpu, "changes of light", count, Location::Device);
-        let lights = || Buffer::from_slice(gpu, "lights", &[]);
+        let lights = |name| Buffer::from_slice(gpu, name, &[]);
         Ok(Self {
             trace: Kernel::new(gpu, &shaders::probe::Constants { effects, thread, traverse, deal })?,
             sum: Kernel::new(gpu, &thread.into())?,
             cells,
             probes: Buffer::new(gpu, "probes", count, Location::Device)?,
             changes: [changes()?, changes()?],
-            lights: [lights()?, lights()?],
-            light_table: Buffer::from_slice(gpu, "light_table", &[])?,
+            lights: [lights("lights before")?, lights("lights after")?],
+            light_table: Buffer::from_slice(gpu, "table of both", &[])?,
             relit: None,
             seed: 0,
         })
@@ -63,7 +63,6 @@ impl Probes {
     /// [`crate::error::Error::Device`].
     pub fn note(
         &mut self,
-        gpu: &Gpu,
         rec: &mut Recorder,
         relit: Option<&Relit>,
         c: &PathConstants,
@@ -77,9 +76,9 @@ impl Probes {
             ..PathConstants::default()
         });
         let Some(relit) = relit else { return Ok(()) };
-        whole(gpu, rec, "lights before", &mut self.lights[0], &relit.before)?;
-        whole(gpu, rec, "lights after", &mut self.lights[1], &relit.after)?;
-        whole(gpu, rec, "table of both", &mut self.light_table, &relit.table)
+        whole(rec, &mut self.lights[0], &relit.before)?;
+        whole(rec, &mut self.lights[1], &relit.after)?;
+        whole(rec, &mut self.light_table, &relit.table)
     }
 
     /// What the paths are told, before the scene changes as after it.
