@@ -164,6 +164,16 @@ impl Film {
         self.channels.iter().find(|c| c.name == name).map(|c| &c.samples)
     }
 
+    /// The channel of this exact name, if it holds floats.
+    pub(crate) fn floats(&self, name: &str) -> Option<&[f32]> {
+        if let Samples::F32(floats) = self.channel(name)? { Some(floats) } else { None }
+    }
+
+    /// The channel of this exact name, if it holds unsigned integers.
+    pub(crate) fn words(&self, name: &str) -> Option<&[u32]> {
+        if let Samples::U32(words) = self.channel(name)? { Some(words) } else { None }
+    }
+
     /// Every layer name, sorted; the colour without a layer is the empty name.
     pub fn layers(&self) -> BTreeSet<&str> {
         self.channels.iter().map(|c| split(&c.name).0).collect()

@@ -58,12 +58,8 @@ impl Renderer {
             |i: usize| Carried { count: samples[i].min(MOST_CARRIED), age: age[i].min(255), edge: false, back: false };
         let points = points(film, scene)?;
         self.run(frame, &Step::Start)?;
-        let tile = &self.frame.film.tiles[0];
-        tile.stats.write(0, &pixels.iter().map(|p| p.stats).collect::<Vec<_>>())?;
-        if self.effects.split_light {
-            tile.light.write(0, &pixels.iter().map(|p| p.light).collect::<Vec<_>>())?;
-        }
-        tile.points.write(0, &points)?;
+        self.write_pixels(&pixels)?;
+        self.frame.film.tiles[0].points.write(0, &points)?;
         history.carried.write(0, &(0..pixels.len()).map(|i| word(i).word()).collect::<Vec<_>>())
     }
 }
@@ -75,10 +71,11 @@ fn points(film: &Film, scene: &Scene) -> Result<Vec<SurfacePoint>> {
         let mut index_of = vec![NONE; numbers.len()];
         (0..).zip(numbers).for_each(|(index, number)| index_of[number as usize] = index);
         let found = film::counts(film, name).map_err(lacks)?;
-        Ok(found.into_iter().map(|number| index_of.get(number as usize).copied().unwrap_or(NONE)).collect::<Vec<_>>())
+        Ok(found.iter().map(|&number| index_of.get(number as usize).copied().unwrap_or(NONE)).collect::<Vec<_>>())
     };
     let (triangle, instance) = (index(POINT[0], scene.triangle_numbers())?, index(POINT[1], scene.instance_numbers())?);
-    let (u, v) = (floats(film, POINT[2])?, floats(film, POINT[3])?);
+    let [u, v] = [POINT[2], POINT[3]].map(|name| film::floats(film, name).map_err(lacks));
+    let (u, v) = (u?, v?);
     let point = |i: usize| SurfacePoint {
         triangle: triangle[i],
         instance: instance[i],
@@ -86,11 +83,4 @@ fn points(film: &Film, scene: &Scene) -> Result<Vec<SurfacePoint>> {
         ..SurfacePoint::default()
     };
     Ok((0..triangle.len()).map(point).collect())
-}
-
-fn floats<'a>(film: &'a Film, name: &str) -> Result<&'a [f32]> {
-    match film.channel(name) {
-        Some(Samples::F32(values)) => Ok(values),
-        _ => Err(Error::Usage(format!("the frame before has no layer \"{name}\""))),
-    }
 }

@@ -92,9 +92,8 @@ struct Records {
 
 impl Records {
     fn read(tile: &FilmTile, pixels: Range<usize>, outputs: Outputs) -> Result<Self> {
-        let guide = |kept: bool, buffer: &Buffer<Guide>| match kept {
-            true => buffer.read_range(pixels.clone()),
-            false => Ok(Vec::new()),
+        let guide = |kept: bool, buffer: &Buffer<Guide>| {
+            if kept { buffer.read_range(pixels.clone()) } else { Ok(Vec::new()) }
         };
         Ok(Self {
             guide: guide(outputs.guides, &tile.guide)?,
@@ -174,15 +173,15 @@ pub(crate) fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
     };
     let (m2, count) = (rgb(film, "m2")?, counts(film, "samples")?);
     let light = light(film)?;
-    let [remainder, light_remainder] = REMAINDERS.map(|name| counts(film, name).ok());
-    let word = |words: &Option<Vec<u32>>, i: usize| words.as_ref().map_or(0, |words| words[i]);
+    let [remainder, light_remainder] = REMAINDERS.map(|name| film.words(name));
+    let word = |words: Option<&[u32]>, i: usize| words.map_or(0, |words| words[i]);
     let at = |plane: [&[f32]; 3], i: usize| plane.map(|values| values[i]);
     let pixel = |i: usize| Pixel {
         stats: PixelStats {
             mean: at(mean, i),
             count: count[i],
             m2: at(m2, i),
-            remainder: word(&remainder, i),
+            remainder: word(remainder, i),
             ..Default::default()
         },
         // Without a sample, the layer holds the albedo at the pixel's centre.
@@ -191,7 +190,7 @@ pub(crate) fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
                 direct: at(direct, i),
                 indirect_m2: indirect_m2[i],
                 albedo: at(albedo, i),
-                remainder: word(&light_remainder, i),
+                remainder: word(light_remainder, i),
                 ..Default::default()
             }
         }),
@@ -218,10 +217,7 @@ pub(crate) fn splits_light(film: &Film) -> std::result::Result<bool, String> {
 fn rgb<'a>(film: &'a Film, layer: &str) -> std::result::Result<[&'a [f32]; 3], String> {
     let plane = |component: &str| {
         let name = if layer.is_empty() { component.to_owned() } else { format!("{layer}.{component}") };
-        match film.channel(&name) {
-            Some(Samples::F32(values)) => Ok(values.as_slice()),
-            _ => Err(format!("has no channel of floats \"{name}\": it must be an EXR file that tallow rendered")),
-        }
+        floats(film, &name)
     };
     Ok([plane("R")?, plane("G")?, plane("B")?])
 }
@@ -233,7 +229,7 @@ fn light(film: &Film) -> std::result::Result<Option<Light<'_>>, String> {
     if !splits_light(film)? {
         return Ok(None);
     }
-    let Some(Samples::F32(m2)) = film.channel(INDIRECT_M2) else {
+    let Some(m2) = film.floats(INDIRECT_M2) else {
         return Err(format!(
             "has no layer \"{INDIRECT_M2}\", the noise of indirect light, as files of earlier versions: it can be filtered, but \
              to add samples render it anew"
@@ -287,15 +283,24 @@ pub fn replace_colour(film: &mut Film, colour: [Vec<f32>; 3], filter: &str) {
     RGB.into_iter().zip(colour).for_each(|(name, plane)| film.add(name, Samples::F32(plane)));
 }
 
+/// A channel of floats.
+///
+/// # Errors
+/// When there is no such channel.
+pub(crate) fn floats<'a>(film: &'a Film, name: &str) -> std::result::Result<&'a [f32], String> {
+    film.floats(name).ok_or_else(|| lacks("channel of floats", name))
+}
+
 /// A layer of counts.
 ///
 /// # Errors
 /// When there is no such layer of integers.
-pub(crate) fn counts(film: &Film, name: &str) -> std::result::Result<Vec<u32>, String> {
-    match film.channel(name) {
-        Some(Samples::U32(counts)) => Ok(counts.clone()),
-        _ => Err(format!("has no layer of counts \"{name}\": it must be an EXR file that tallow rendered")),
-    }
+pub(crate) fn counts<'a>(film: &'a Film, name: &str) -> std::result::Result<&'a [u32], String> {
+    film.words(name).ok_or_else(|| lacks("layer of counts", name))
+}
+
+fn lacks(what: &str, name: &str) -> String {
+    format!("has no {what} \"{name}\": it must be an EXR file that tallow rendered")
 }
 
 fn add_guide(film: &mut Film, guide: &[Guide]) {

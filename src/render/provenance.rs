@@ -27,7 +27,7 @@ pub(crate) struct SampleRange {
 }
 
 impl SampleRange {
-    /// Index of the last. Ranges in an [`Provenance`] have one.
+    /// Index of the last. Ranges in a [`Provenance`] have one.
     pub(crate) fn last(&self) -> u32 {
         self.first + (self.count - 1)
     }
@@ -97,10 +97,10 @@ fn check_ranges(samples: &[SampleRange]) -> std::result::Result<(), String> {
     }
     let mut sorted = samples.to_vec();
     sorted.sort();
-    match sorted.windows(2).any(|pair| pair[0].overlaps(&pair[1])) {
-        true => wrong("overlap"),
-        false => Ok(()),
+    if sorted.windows(2).any(|pair| pair[0].overlaps(&pair[1])) {
+        return wrong("overlap");
     }
+    Ok(())
 }
 
 fn said<'a>(film: &'a Film, key: &str) -> std::result::Result<&'a str, String> {
@@ -138,7 +138,7 @@ pub(crate) fn metadata(renderer: &Renderer, film: &Film) -> Result<BTreeMap<Stri
     };
     let settings = renderer.settings();
     let counts = film::counts(film, "samples").map_err(Error::Usage)?;
-    let count = counts.into_iter().max().unwrap_or(0);
+    let count = counts.iter().copied().max().unwrap_or(0);
     let range = SampleRange { seed: settings.seed, first: settings.first_sample, count };
     let entries = [(SETTINGS, json(settings)?), (SCENE, scene.to_string()), (SAMPLES, json(&[range])?)];
     Ok(entries.map(|(key, value)| (key.to_owned(), value)).into())

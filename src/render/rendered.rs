@@ -2,7 +2,7 @@
 //! trusts them from here on.
 use super::film;
 use super::provenance::Provenance;
-use crate::image::{Film, Samples};
+use crate::image::Film;
 use crate::render::schedule;
 use crate::render::settings::{Placing, Settings};
 use crate::statistics::{BrokenSamples, Pixel};
@@ -56,9 +56,10 @@ impl Rendered {
         let pixels = film::pixels(film)?;
         check_pixels(&pixels, settings.width, provenance.samples_per_pixel())?;
         let pending = film.channel(film::PENDING).map(|_| film::counts(film, film::PENDING)).transpose()?;
-        if let Some(pending) = &pending {
+        if let Some(pending) = pending {
             check_pending(pending, &pixels, &settings)?;
         }
+        let pending = pending.map(<[u32]>::to_vec);
         let broken = film::broken_samples(film)?;
         Ok(Self { provenance, settings, pixels, broken, pending })
     }
@@ -74,11 +75,10 @@ impl Rendered {
     /// # Errors
     /// When they are missing.
     pub(crate) fn priority(&self, film: &Film) -> Result<Vec<f32>, String> {
-        match film.channel(film::PRIORITY) {
-            _ if self.settings.allocate.is_even() => Ok(Vec::new()),
-            Some(Samples::F32(priority)) => Ok(priority.clone()),
-            _ => Err(format!("has no layer \"{}\": take the file as tallow wrote it", film::PRIORITY)),
+        if self.settings.allocate.is_even() {
+            return Ok(Vec::new());
         }
+        film::floats(film, film::PRIORITY).map(<[f32]>::to_vec)
     }
 }
 
@@ -131,10 +131,10 @@ fn check_pending(pending: &[u32], pixels: &[Pixel], settings: &Settings) -> Resu
         return Err(format!("a pixel has or lacks {too_many} samples, but its settings allow {most}"));
     }
     let (all, budget) = (sums().sum::<u64>(), budget(settings));
-    match all > budget {
-        true => Err(format!("its pixels have or lack {all} samples, but its settings allow {budget}")),
-        false => Ok(()),
+    if all > budget {
+        return Err(format!("its pixels have or lack {all} samples, but its settings allow {budget}"));
     }
+    Ok(())
 }
 
 fn most_of_pixel(settings: &Settings) -> u32 {

@@ -5,7 +5,6 @@ use super::{PathRange, Progress, Renderer, Step, film};
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::image::{self, Film};
-use crate::layout::{PixelLight, PixelStats};
 use crate::render::schedule;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -88,9 +87,11 @@ impl Renderer {
         let allocation = self.frame.allocation()?;
         let Checkpoint { pixels, priority, pending, .. } = checkpoint;
         let size = self.settings.pixels();
-        let of_film = |what: &str, len: usize| match len == size {
-            true => Ok(()),
-            false => Err(Error::Usage(format!("{len} {what} for a film of {size} pixels: give one each"))),
+        let of_film = |what: &str, len: usize| {
+            if len == size {
+                return Ok(());
+            }
+            Err(Error::Usage(format!("{len} {what} for a film of {size} pixels: give one each")))
         };
         of_film("statistics", pixels.len())?;
         of_film("pending counts", pending.len())?;
@@ -98,14 +99,21 @@ impl Renderer {
             of_film("priorities", priority.len())?;
         }
         self.run(frame, &Step::Start)?;
-        let film = &self.frame.film;
-        film.tiles[0].stats.write(0, &pixels.iter().map(|p| p.stats).collect::<Vec<PixelStats>>())?;
+        self.write_pixels(pixels)?;
+        let counts = &self.frame.film.counts;
+        counts.priority.write(0, priority)?;
+        counts.count.write(0, pending)?;
+        self.gpu.run(frame, |rec| allocation.scan.record(rec, counts))?;
+        Ok(())
+    }
+
+    /// Puts samples into a film of one tile.
+    pub(super) fn write_pixels(&self, pixels: &[Pixel]) -> Result<()> {
+        let tile = &self.frame.film.tiles[0];
+        tile.stats.write(0, &pixels.iter().map(|p| p.stats).collect::<Vec<_>>())?;
         if self.effects.split_light {
-            film.tiles[0].light.write(0, &pixels.iter().map(|p| p.light).collect::<Vec<PixelLight>>())?;
+            tile.light.write(0, &pixels.iter().map(|p| p.light).collect::<Vec<_>>())?;
         }
-        film.counts.priority.write(0, priority)?;
-        film.counts.count.write(0, pending)?;
-        self.gpu.run(frame, |rec| allocation.scan.record(rec, &film.counts))?;
         Ok(())
     }
 }
@@ -116,9 +124,10 @@ pub fn finished(path: &Path, scene: &Scene, settings: &Settings) -> Option<Film>
     let film = image::read(path).ok()?;
     let rendered = Rendered::of(&film).ok()?;
     check(&rendered, scene, settings).ok()?;
-    let done = match settings.allocate.is_even() {
-        true => rendered.pixels.iter().all(|pixel| pixel.stats.count == settings.spp),
-        false => rendered.pending.is_none(),
+    let done = if settings.allocate.is_even() {
+        rendered.pixels.iter().all(|pixel| pixel.stats.count == settings.spp)
+    } else {
+        rendered.pending.is_none()
     };
     done.then_some(film)
 }

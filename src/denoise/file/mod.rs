@@ -6,7 +6,6 @@ use super::noisy::{Holds, Noisy};
 use super::windows;
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Location};
-use crate::image::Samples;
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats};
 use crate::render::film::{ALBEDO, INDIRECT_STRIDE, SHARP_DIRECT};
@@ -41,15 +40,11 @@ impl<'a> Layers<'a> {
                     .to_owned(),
             );
         }
-        let indirect_m2 = match film.channel("indirect.m2") {
-            Some(Samples::F32(m2)) => Some(m2.as_slice()),
-            _ => None,
-        };
         let mut layers = Self {
             aovs,
             places: Places::new(aovs, &mut notes),
             reflects: false,
-            indirect_m2,
+            indirect_m2: film.floats("indirect.m2"),
             samples_of_all: samples_of_all(aovs),
             of_one_sample: film.channels.iter().any(|c| c.name.starts_with("RelativeVariance.")),
             notes,

@@ -1,6 +1,6 @@
 //! What a file says of an image's expectation: means, and how far they may be off.
 use crate::image::aov::{Aov, Aovs, Names};
-use crate::image::{FILTERED, Film, Picture, Samples};
+use crate::image::{FILTERED, Film, Picture};
 
 /// How far the mean of a pixel may be from its expectation.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,10 +49,7 @@ impl Estimate {
             (_, None, Some(variance)) => Noise::SquaredErrors(variance),
             (_, _, None) => return Err(without_noise(film)),
         };
-        let objects = match film.channel("id") {
-            Some(Samples::U32(objects)) if aovs.is_tallow_s() => Some(objects.clone()),
-            _ => None,
-        };
+        let objects = film.words("id").filter(|_| aovs.is_tallow_s()).map(<[u32]>::to_vec);
         Self { width: film.width, height: film.height, mean, noise, objects }.checked()
     }
 
