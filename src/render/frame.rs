@@ -63,15 +63,11 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
     match step {
         Step::Start => {
             begin_anew(rec, frame)?;
-            if let Some(Allocation { policy, .. }) = &frame.allocation {
-                policy.prepare(rec, &inputs(film), priority_push)?; // guide[P] -> the policy's own
-            }
+            prepare_policy(rec, frame)?;
         }
         Step::Reproject => {
             begin_with_history(rec, frame)?;
-            if let Some(Allocation { policy, .. }) = &frame.allocation {
-                policy.prepare(rec, &inputs(film), priority_push)?; // guide[P] -> the policy's own
-            }
+            prepare_policy(rec, frame)?;
         }
         Step::Uniform(batch) => {
             let push = path::push_of_batch(&constants.path, batch);
@@ -150,6 +146,12 @@ fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
     history.settle(Some(constants.camera));
     Ok(())
+}
+
+/// Once per frame, where samples are placed.
+fn prepare_policy(rec: &mut Recorder, frame: &Frame) -> Result<()> {
+    let Some(Allocation { policy, .. }) = &frame.allocation else { return Ok(()) };
+    policy.prepare(rec, &inputs(&frame.film), &frame.priority_push) // guide[P] -> the policy's own
 }
 
 /// Records what a history needs of the last frame before more than the camera changes: [`Step::Reproject`] does the rest.

@@ -2,15 +2,20 @@
 //! [`crate::twins::reproject`].
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
-use crate::layout::PathConstants;
+use crate::layout::{PathConstants, ReprojectPush};
 use crate::render::buffers::{DeviceScene, FilmTile, part_if};
 use crate::render::history::{Forward, History, Way};
 use crate::shaders::{carry, edges, gather, project, remember};
+use std::ops::Range;
+
+/// The pixels of each window of a tile, and what kernels are told of them.
+fn windows(h: &History, t: &FilmTile, c: &PathConstants) -> impl Iterator<Item = (Range<usize>, ReprojectPush)> {
+    t.windows().map(|w| (w.start as usize..w.end as usize, h.push(c, w.start, w.end - w.start)))
+}
 
 /// Before the scene changes, and before the new frame's primary hits: guide\[P\], points\[P\], stats\[P\], light\[P\] -> history\[P\]
 pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
-    t.windows().try_for_each(|w| {
-        let part = w.start as usize..w.end as usize;
+    for (part, push) in windows(h, t, c) {
         let bind = remember::Bind {
             scene: s.bind(),
             frame: s.bind_frame(),
@@ -26,29 +31,32 @@ pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, 
             instance_now: &h.numbers.instance_now,
             triangle_now: &h.numbers.triangle_now,
         };
-        rec.dispatch_threads(&h.remember, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
-    })
+        rec.dispatch_threads(&h.remember, bind, &push, push.pixels)?;
+    }
+    Ok(())
 }
 
 /// After them: history\[P\], guide\[P\], points\[P\], changes\[cells\] -> stats\[P\], light\[P\], carried\[P\]
 pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
     match &h.way {
-        Way::Forward(way) => forward(rec, way, (h, s, t), c),
-        Way::Backward(gather) => backward(rec, gather, (h, s, t), c),
+        Way::Forward(way) => forward(rec, way, h, s, t, c),
+        Way::Backward(gather) => backward(rec, gather, h, s, t, c),
     }
 }
 
 fn forward(
     rec: &mut Recorder,
     way: &Forward,
-    (h, s, t): (&History, &DeviceScene, &FilmTile),
+    h: &History,
+    s: &DeviceScene,
+    t: &FilmTile,
     c: &PathConstants,
 ) -> Result<()> {
-    t.windows().try_for_each(|w| {
-        let winner = &h.carried.part(w.start as usize..w.end as usize)?;
+    for (part, push) in windows(h, t, c) {
+        let winner = &h.carried.part(part)?;
         let bind = edges::Bind { scene: s.bind(), frame: s.bind_frame(), guide: &t.guide, points: &t.points, winner };
-        rec.dispatch_threads(&way.edges, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
-    })?;
+        rec.dispatch_threads(&way.edges, bind, &push, push.pixels)?;
+    }
     let bind = project::Bind {
         scene: s.bind(),
         frame: s.bind_frame(),
@@ -60,8 +68,7 @@ fn forward(
         winner: &h.carried,
     };
     rec.dispatch_threads(&way.project, bind, &h.push(c, 0, t.pixels), t.pixels)?;
-    t.windows().try_for_each(|w| {
-        let part = w.start as usize..w.end as usize;
+    for (part, push) in windows(h, t, c) {
         let bind = carry::Bind {
             frame: s.bind_frame(),
             history: &h.records,
@@ -73,18 +80,20 @@ fn forward(
             points: &t.points.part(part.clone())?,
             winner: &h.carried.part(part)?,
         };
-        rec.dispatch_threads(&way.carry, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
-    })
+        rec.dispatch_threads(&way.carry, bind, &push, push.pixels)?;
+    }
+    Ok(())
 }
 
 fn backward(
     rec: &mut Recorder,
     gather: &Kernel<gather::Bind<'static>>,
-    (h, s, t): (&History, &DeviceScene, &FilmTile),
+    h: &History,
+    s: &DeviceScene,
+    t: &FilmTile,
     c: &PathConstants,
 ) -> Result<()> {
-    t.windows().try_for_each(|w| {
-        let part = w.start as usize..w.end as usize;
+    for (part, push) in windows(h, t, c) {
         let bind = gather::Bind {
             scene: s.bind(),
             frame: s.bind_frame(),
@@ -99,6 +108,7 @@ fn backward(
             light: &part_if(t.has_light(), &t.light, &part)?,
             carried: &h.carried.part(part)?,
         };
-        rec.dispatch_threads(gather, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
-    })
+        rec.dispatch_threads(gather, bind, &push, push.pixels)?;
+    }
+    Ok(())
 }
