@@ -82,9 +82,9 @@ impl Candidate {
         let stride = self.settings.indirect_stride;
         match self.filter {
             Some(filter) => filter.check_stride(stride),
-            None if stride > 1 => Err(Error::Usage(format!(
-                "with indirect_stride {stride} most pixels lack indirect light until a filter fills it in: leave out the filter none"
-            ))),
+            None if stride > 1 => {
+                Err(Error::Usage(format!("{}: leave out the filter none", filter::missing_light(stride))))
+            }
             None => Ok(()),
         }
     }

@@ -59,8 +59,8 @@ impl Method {
     pub fn check_stride(self, stride: u32) -> Result<()> {
         match self {
             Self::Oidn if stride > 1 => Err(Error::Usage(format!(
-                "oidn wants the colour whole, but indirect_stride {stride} leaves most pixels without indirect light: choose another \
-                 filter"
+                "{}, and oidn wants the colour whole: choose another filter",
+                missing_light(stride)
             ))),
             _ => Ok(()),
         }
@@ -87,4 +87,9 @@ impl From<&'static Row> for Method {
     fn from(row: &'static Row) -> Self {
         Self::Kernels(row)
     }
+}
+
+/// What is wrong with light that was traced for pixels `stride` apart, to which callers add the remedy.
+pub(crate) fn missing_light(stride: u32) -> String {
+    format!("with indirect_stride {stride} most pixels lack indirect light until a filter fills it in")
 }

@@ -30,6 +30,7 @@ pub use footprint::{FootprintOverrides, FootprintSettings};
 pub use guided::{GuidedOverrides, GuidedSettings, GuidedSums};
 pub use input::FilterInput;
 pub use method::Method;
+pub(crate) use method::missing_light;
 pub use oidn::{OidnOverrides, OidnQuality, OidnSettings};
 pub use readers::readers;
 pub use scales::Scales;
