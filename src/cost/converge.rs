@@ -9,9 +9,8 @@ use crate::error::Result;
 use crate::gpu::{FrameResources, Gpu};
 use crate::image::{Picture, metrics};
 use crate::render::settings::Settings;
-use crate::render::{Job, Outputs, Renderer, StopReason};
+use crate::render::{Job, Outputs, Renderer};
 use crate::scene::{Fingerprint, Scene};
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -124,9 +123,7 @@ impl Converging {
     /// [`crate::error::Error::Device`].
     fn grow(&mut self, stop: &dyn Fn() -> bool) -> Result<bool> {
         self.renderer.set_seed(FIRST_SEED.wrapping_add(self.parts.count));
-        let mut between = |_: &_| Ok(if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) });
-        let status = Job::new(&self.renderer).run(&mut self.frame, &mut between)?;
-        if status.stopped == StopReason::Interrupted {
+        if Job::new(&self.renderer).run_until(&mut self.frame, stop)?.is_none() {
             return Ok(false);
         }
         self.parts.add(&self.renderer.picture()?);

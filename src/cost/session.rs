@@ -5,13 +5,12 @@ use super::motion::{Motion, Moving};
 use super::rounds::{Measured, Outcome, Runs};
 use crate::denoise::{Noisy, Recipe, Timed, filter, host_bytes, timed};
 use crate::error::{Error, Result};
-use crate::gpu::{FrameResources, Gpu, PassTime};
+use crate::gpu::{FrameResources, Gpu, PassTime, milliseconds};
 use crate::image::Picture;
 use crate::machine::wake;
 use crate::memory;
-use crate::render::{Job, Renderer, Status, StopReason, called_for, film};
+use crate::render::{Job, Renderer, Status, called_for, film};
 use crate::scene::{Change, Scene};
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 /// Part of the device's largest heap that warm renderers may take together.
@@ -243,11 +242,9 @@ fn tell(warm: &mut [Option<Warm>], change: &Change) {
 
 /// Runs a whole render, and returns its wall time. `None` if it was stopped.
 fn trace(job: &Job, frame: &mut FrameResources, stop: &dyn Fn() -> bool) -> Result<Option<(Status, Duration)>> {
-    let mut between = |_: &Status| Ok(if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) });
     let begun = Instant::now();
-    let status = job.run(frame, &mut between)?;
-    let wall = begun.elapsed();
-    Ok((status.stopped != StopReason::Interrupted).then_some((status, wall)))
+    let status = job.run_until(frame, stop)?;
+    Ok(status.map(|status| (status, begun.elapsed())))
 }
 
 /// Sums of the times by pass, in the order in which the passes first ran.
@@ -270,8 +267,4 @@ fn again(e: &Error) -> Error {
         Error::Memory(what) => Error::Memory(what.clone()),
         other => Error::Device(other.to_string()),
     }
-}
-
-fn milliseconds(time: Duration) -> f64 {
-    time.as_secs_f64() * 1e3
 }

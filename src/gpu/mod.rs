@@ -56,6 +56,7 @@ pub use oidn::{OIDN_VARIABLE, Oidn, OidnInput, Texels};
 pub use ray_query::Tracing;
 pub use recorder::Recorder;
 pub use shape::{BoundRange, KernelCode, Pass, PassObserver, PassShape};
+pub(crate) use timing::milliseconds;
 pub use timing::{Calibration, PassTime, host_ns, total_ms};
 pub use tuning::Tuning;
 

@@ -3,7 +3,7 @@ use super::{At, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::OnceLock;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Queries per pool; a pass takes two.
 const POOL: u32 = 1024;
@@ -34,6 +34,11 @@ impl PassTime {
 /// Sum of the durations of some passes in milliseconds.
 pub fn total_ms<'a>(passes: impl IntoIterator<Item = &'a PassTime>) -> f64 {
     passes.into_iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6
+}
+
+/// A duration in milliseconds.
+pub(crate) fn milliseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
 }
 
 /// Nanoseconds since the first call of this function, on a monotonic clock.

@@ -1,5 +1,5 @@
 //! A steady frame time: how many samples the next frame may take, from what the last ones took.
-use crate::gpu::PassTime;
+use crate::gpu::{PassTime, milliseconds};
 use std::time::Duration;
 
 /// Weight of the newest frame in the time of a sample.
@@ -62,10 +62,6 @@ impl FramePacer {
         }
         self.observe(samples, Duration::from_nanos(passes.iter().map(PassTime::duration_ns).sum()));
     }
-}
-
-fn milliseconds(time: Duration) -> f64 {
-    time.as_secs_f64() * 1e3
 }
 
 #[cfg(test)]

@@ -93,7 +93,9 @@ impl<'a> Job<'a> {
         between: &mut dyn FnMut(&Status) -> Result<ControlFlow<()>>,
     ) -> Result<Status> {
         let renderer = self.renderer;
-        self.checkpoint.map_or(Ok(()), |checkpoint| renderer.resume(frame, checkpoint))?;
+        if let Some(checkpoint) = self.checkpoint {
+            renderer.resume(frame, checkpoint)?;
+        }
         let (begun, steps) = self.begin(frame)?;
         let (mut status, mut steps, mut listed) = (self.at_start(), steps.peekable(), u64::MAX);
         let (mut pace, mut left) = (Pace::new(self.step_time, renderer.gpu.info().kind), Vec::new());
@@ -133,6 +135,13 @@ impl<'a> Job<'a> {
     /// As [`Renderer::run`] and [`Renderer::resume`].
     pub fn run_to_end(&self, frame: &mut FrameResources) -> Result<Status> {
         self.run(frame, &mut |_| Ok(ControlFlow::Continue(())))
+    }
+
+    /// [`Job::run`] until `stop` says so between two steps; `None` if it did.
+    pub(crate) fn run_until(&self, frame: &mut FrameResources, stop: &dyn Fn() -> bool) -> Result<Option<Status>> {
+        let mut between = |_: &_| Ok(if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) });
+        let status = self.run(frame, &mut between)?;
+        Ok((status.stopped != StopReason::Interrupted).then_some(status))
     }
 
     /// Reads back what there is: the layers that the renderer's [`super::Outputs`] ask for, and as metadata what
@@ -221,10 +230,10 @@ impl<'a> Job<'a> {
     /// Samples to take at most.
     fn planned(&self) -> u64 {
         let settings = self.renderer.settings();
-        match self.carries {
-            true => u64::from(settings.spp) * settings.pixels() as u64,
-            false => self.steps().map(|step| step.paths()).sum(),
+        if self.carries {
+            return u64::from(settings.spp) * settings.pixels() as u64;
         }
+        self.steps().map(|step| step.paths()).sum()
     }
 
     fn ended(&self, status: Status) -> Result<Status> {

@@ -2,7 +2,7 @@
 //! it, and frames recorded batch by batch into command buffers.
 use crate::allocate::HostInputs;
 use crate::error::{Error, Result};
-use crate::gpu::{DeviceInfo, FrameResources, Gpu, PassTime, Recorder};
+use crate::gpu::{DeviceInfo, FrameResources, Gpu, PassTime, Recorder, milliseconds};
 use crate::image::Picture;
 use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush, uvec2, vec4};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
@@ -14,7 +14,6 @@ use crate::render::schedule::{self, Cut, Step};
 use crate::render::settings::{Sampler, Settings, Split};
 use crate::scene::{self, Fingerprint, Scene};
 use crate::statistics::BrokenSamples;
-use std::time::Duration;
 
 /// What a render leaves in buffers besides radiance and its variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,7 +36,8 @@ impl Outputs {
     }
 }
 
-/// A scene on a device and the kernels to render it. Everything is created in [`Renderer::new`], nothing later.
+/// A scene on a device and the kernels to render it, all made in [`Renderer::new`]. Later, only [`Renderer::keep_history`] makes more, and
+/// [`Renderer::update`] allocates memory where the scene has grown.
 pub struct Renderer {
     pub(crate) gpu: Gpu,
     pub(super) frame: Frame,
@@ -104,12 +104,12 @@ impl Renderer {
 
     fn check_offsets(&self, to: &str, or: &str) -> Result<()> {
         let (pixels, most) = (self.settings.pixels(), self.most_offsets());
-        match self.can_resume() {
-            true => Ok(()),
-            false => Err(Error::Usage(format!(
-                "a film of {pixels} pixels is too large to {to} on this device: choose at most {most} pixels{or}"
-            ))),
+        if self.can_resume() {
+            return Ok(());
         }
+        Err(Error::Usage(format!(
+            "a film of {pixels} pixels is too large to {to} on this device: choose at most {most} pixels{or}"
+        )))
     }
 
     /// [`Renderer::new`] with other effects compiled in: more of them, up to [`crate::render::all_effects`], change nothing but the speed, fewer
@@ -375,10 +375,6 @@ fn room_for_paths(records: u64, waiting: u64, [binding, texels, heap]: [u64; 3])
     const PART: u64 = 8;
     const TEXEL: u64 = size_of::<vec4>() as u64;
     (binding.min(heap / PART) / waiting.max(records * TEXEL)).min(texels / records)
-}
-
-fn milliseconds(time: Duration) -> f64 {
-    time.as_secs_f64() * 1e3
 }
 
 #[cfg(test)]

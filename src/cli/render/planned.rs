@@ -3,7 +3,7 @@ use super::{Args, check_room};
 use crate::cli::files::Item;
 use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, milliseconds};
 use crate::image::input;
 use crate::plan::{self, Plan, Target};
 use crate::render::settings::Settings;
@@ -23,7 +23,7 @@ pub fn duration(text: &str) -> std::result::Result<Duration, String> {
 }
 
 fn target(args: &Args) -> Option<Target> {
-    let time = args.time.map(|time| Target::GpuMs(time.as_secs_f64() * 1e3));
+    let time = args.time.map(|time| Target::GpuMs(milliseconds(time)));
     time.or(args.error.map(Target::RelMse))
 }
 
@@ -58,12 +58,11 @@ pub fn settings(args: &Args, plan: &Plan, scene: &Scene) -> Result<Settings> {
     let mut settings = plan.settings.clone();
     args.overrides.apply(&mut settings);
     let other = settings != plan.settings || args.denoise.is_some();
-    match other {
-        true => {
-            Err(Error::Usage("the plan says all settings and the filter: leave out options that say others".to_owned()))
-        }
-        false => Ok(settings),
+    if other {
+        let what = "the plan says all settings and the filter: leave out options that say others";
+        return Err(Error::Usage(what.to_owned()));
     }
+    Ok(settings)
 }
 
 /// Plans what is asked for, if something is.
