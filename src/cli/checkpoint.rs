@@ -1,8 +1,8 @@
 //! `--checkpoint`: writes an unfinished render to a file at regular intervals, so that a crash loses only the work since
 //! the last one.
 use super::complain;
-use super::files::{Files, Item, partial_name, scene_name};
-use crate::image::{self, Film, WriteOptions, output};
+use super::files::{Files, Item, first_with_layers, partial_name, scene_name};
+use crate::image::{Film, WriteOptions, output};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -18,8 +18,7 @@ pub struct CheckpointFile {
 /// Path for the checkpoints of a render with these outputs: beside the first that holds all layers, or else the first; in the
 /// working folder under the name of the scene where all are pipes.
 pub fn path(outputs: &[PathBuf], scene: &Path) -> PathBuf {
-    let layers = outputs.iter().find(|path| image::has_layers(path));
-    let first = layers.or_else(|| outputs.iter().find(|path| !output::is_special(path)));
+    let first = first_with_layers(outputs).or_else(|| outputs.iter().find(|path| !output::is_special(path)));
     partial_name(&first.map_or_else(|| default_output(scene), |path| path.with_extension("exr")))
 }
 

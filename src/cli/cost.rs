@@ -107,7 +107,7 @@ fn finish(
     let (document, images) = (&document, &images);
     let written = folder.write(document, images, ended == Ended::Complete);
     args.common.report(&Report { document, warnings }, || text(document, &written))?;
-    folder.failure().map_or(Ok(()), Err)?;
+    folder.check()?;
     match ended {
         Ended::Stopped => {
             complain("interrupted: what there is was written; the same command goes on from there");

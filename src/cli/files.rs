@@ -50,13 +50,12 @@ pub struct Files {
 
 /// Name for an incomplete file: `a.partial.exr` for `a.exr`.
 pub fn partial_name(path: &Path) -> PathBuf {
-    let mut name = path.file_stem().unwrap_or_default().to_owned();
-    name.push(".partial");
-    if let Some(extension) = path.extension() {
-        name.push(".");
-        name.push(extension);
-    }
-    path.with_file_name(name)
+    output::with_suffix(path, ".partial")
+}
+
+/// The first of the paths whose format holds all layers.
+pub fn first_with_layers(paths: &[PathBuf]) -> Option<&PathBuf> {
+    paths.iter().find(|path| image::has_layers(path))
 }
 
 /// A key that is the same for all paths of one file.
@@ -114,24 +113,24 @@ impl Files {
         interrupt::leave_at_once("interrupted: all files are written");
     }
 
-    /// All failures so far as one error.
-    pub fn failure(&self) -> Option<Error> {
-        let ((path, first), more) = self.failures.split_first()?;
+    /// Whether all was written so far.
+    ///
+    /// # Errors
+    /// [`Error::Output`] with all failures.
+    pub fn check(&self) -> Result<()> {
+        let Some(((path, first), more)) = self.failures.split_first() else { return Ok(()) };
         let more = more.iter().map(|(path, what)| format!("; {}: {what}", path.display())).collect::<String>();
-        Some(Error::output(path, format!("{first}{more}")))
+        Err(Error::output(path, format!("{first}{more}")))
     }
 
     /// Appends all failures so far to `line`.
     pub fn with_failures(&self, line: &str) -> String {
-        self.failure().map_or(line.to_owned(), |e| format!("{line}; {e}"))
+        self.check().map_or_else(|e| format!("{line}; {e}"), |()| line.to_owned())
     }
 
     fn save_one(&mut self, item: &Item, whole: bool) -> Option<PathBuf> {
         let taken = !self.own.contains_key(&key(&item.path)) && item.path.try_exists().unwrap_or(true);
-        let saved = match whole || !taken {
-            true => self.replace(item),
-            false => self.add(&partial_name(&item.path), item),
-        };
+        let saved = if whole || !taken { self.replace(item) } else { self.add(&partial_name(&item.path), item) };
         saved.map_or_else(|e| self.put_elsewhere(item, &e), Some)
     }
 
@@ -246,7 +245,7 @@ mod tests {
         assert_eq!([&old, &inside("old.partial.exr")].map(|path| read(path)), ["old"; 2]);
         save(&mut files, "whole", true);
         assert_eq!(read(&old), "whole");
-        assert!(files.failure().is_none());
+        assert!(files.check().is_ok());
     }
 
     #[test]

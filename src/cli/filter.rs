@@ -140,7 +140,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         after: distance(&clean.shown),
     };
     args.common.report(&summary, || text(args, &summary))?;
-    files.failure().map_or(Ok(()), Err)?;
+    files.check()?;
     Ok(Exit::Done)
 }
 

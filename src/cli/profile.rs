@@ -77,9 +77,10 @@ struct Report<'a> {
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let old = args.compare.as_deref().map(Profile::read).transpose()?;
-    let Fresh { profile, trace, warnings } = match args.is_earlier() {
-        true => Fresh { profile: Profile::read(&args.scene)?, trace: None, warnings: Vec::new() },
-        false => fresh::profile(args, old.as_ref())?,
+    let Fresh { profile, trace, warnings } = if args.is_earlier() {
+        Fresh { profile: Profile::read(&args.scene)?, trace: None, warnings: Vec::new() }
+    } else {
+        fresh::profile(args, old.as_ref())?
     };
     let comparison = old.map(|old| Comparison::new(&old, &profile)).transpose()?;
     let csv = args.csv.iter().map(|path| Item::bytes(path.clone(), text::csv(&profile).into_bytes()));
@@ -89,7 +90,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     files.save(&items, true);
     report(args, &profile, &warnings, comparison.as_ref())?;
     files.pipe(&items, true);
-    files.failure().map_or(Ok(()), Err)?;
+    files.check()?;
     Ok(match comparison.map(|found| found.verdict) {
         Some(Verdict::Changed) => Exit::LimitExceeded,
         Some(Verdict::Inconclusive) => Exit::Undecided,

@@ -4,29 +4,27 @@ mod planned;
 mod shot;
 mod spans;
 mod summary;
+mod taken;
 
-use super::checkpoint::{self, CheckpointFile};
+use super::checkpoint;
 use super::common::{Common, PngOptions};
-use super::files::Files;
 use super::overrides::Overrides;
-use super::{Exit, complain, fail_on_messages, interrupt};
+use super::{Exit, complain};
+use crate::denoise;
 use crate::denoise::filter::{self, Method};
-use crate::denoise::{self, Filtered, Noisy, Recipe};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, PassTime, Tracing};
-use crate::image::{self, Film};
+use crate::gpu::{Gpu, Tracing};
+use crate::image;
 use crate::layout::Effects;
 use crate::memory;
 use crate::render::settings::{Allocate, Settings};
-use crate::render::{Checkpoint, Job, Outputs, Renderer, StopReason, all_effects, film};
+use crate::render::{Checkpoint, Job, Outputs, Renderer, all_effects, film};
 use crate::scene::{Loaded, Scene, SceneFile, light_and_camera_effects};
-use crate::statistics::BrokenSamples;
-use shot::Shot;
 pub use shot::{CHOICES, FRAME};
 pub use spans::Spans;
 use std::path::PathBuf;
 use std::time::Duration;
-use summary::{Outcome, text};
+pub use taken::{Taken, shoot};
 
 /// Which effects are compiled into the kernels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -137,7 +135,9 @@ impl Args {
 /// an output that fails keeps no other from being written.
 pub fn run(args: &Args) -> Result<Exit> {
     outputs::check(args)?;
-    args.denoise.map_or(Ok(()), Method::check)?;
+    if let Some(method) = args.denoise {
+        method.check()?;
+    }
     let mut host = Spans::default();
     let plan = planned::read(args)?;
     let (scene, settings) = host.time("load scene", || load(args))?;
@@ -159,11 +159,8 @@ pub fn run(args: &Args) -> Result<Exit> {
             "warning: a film of this size cannot go on from a checkpoint on this device, which keeps the picture alone",
         );
     }
-    let begun = Begun { earlier: earlier.as_ref(), carries: false };
-    let mut taken = shoot(args, &gpu, &scene, &renderer, begun, host)?;
-    if let Some(taken) = &mut taken {
-        taken.outcome.plan = plan;
-    }
+    let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
+    let taken = shoot(args, &gpu, &scene, job, host)?;
     let can_resume = renderer.can_resume();
     // The film is all that is left to write and to filter, and large films need the memory.
     drop(renderer);
@@ -171,126 +168,12 @@ pub fn run(args: &Args) -> Result<Exit> {
         complain("interrupted before the first sample: nothing was written");
         return Ok(Exit::Interrupted);
     };
-    let Ended { exit, written } = taken.finish(args, true)?;
-    if exit == Exit::Interrupted {
+    let written = taken.finish(args, plan.as_ref(), true)?;
+    if !taken.is_whole() {
         complain(&outputs::interruption(&written, can_resume));
+        return Ok(Exit::Interrupted);
     }
-    Ok(exit)
-}
-
-/// How a render ended, and the files that it was written to.
-pub struct Ended {
-    /// [`Exit::Done`] or [`Exit::Interrupted`].
-    pub exit: Exit,
-    written: Vec<PathBuf>,
-}
-
-/// A render that is over, and nowhere written yet.
-pub struct Taken<'a> {
-    outcome: Outcome<'a>,
-    noisy: Option<Noisy>,
-    files: Files,
-    checkpoint: Option<CheckpointFile>,
-}
-
-/// What a render begins with.
-#[derive(Clone, Copy, Default)]
-pub struct Begun<'a> {
-    /// The render that it continues.
-    pub earlier: Option<&'a Checkpoint>,
-    /// Whether with samples of the frame before.
-    pub carries: bool,
-}
-
-/// A signal and a checkpoint wait for a step.
-const STEP_TIME: Duration = Duration::from_secs(1);
-
-/// Takes the samples; none when it was interrupted before the first.
-///
-/// # Errors
-/// [`Error::Device`].
-pub fn shoot<'a>(
-    args: &Args,
-    gpu: &'a Gpu,
-    scene: &'a Scene,
-    renderer: &Renderer,
-    begun: Begun,
-    mut host: Spans,
-) -> Result<Option<Taken<'a>>> {
-    let noisy = args.filter(renderer.settings()).map(|_| Noisy::of_film(renderer)).transpose()?;
-    let pixel = args.pixel.map(|[x, y]| y * renderer.settings().width + x);
-    let Begun { earlier: checkpoint, carries } = begun;
-    let job = Job { checkpoint, step_time: Some(STEP_TIME), pixel, carries, ..Job::new(renderer) };
-    let shot = Shot { args, gpu, job };
-    let mut files = Files::new(args.resume.as_deref());
-    let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
-    if status.stopped == StopReason::Interrupted && status.traced == 0 {
-        return Ok(None);
-    }
-    status.broken_samples.iter().for_each(warn_of_broken);
-    let seconds = host.seconds("render");
-    let film = host.time("read back", || shot.film(&status, seconds))?;
-    let counters = args.counters.then(|| renderer.counters()).transpose()?;
-    let outcome = Outcome { gpu, scene, film, host, status, counters, plan: None, notes: Vec::new() };
-    Ok(Some(Taken { outcome, noisy, files, checkpoint }))
-}
-
-impl Taken<'_> {
-    /// Whether all of its samples were taken.
-    pub fn is_whole(&self) -> bool {
-        self.outcome.status.stopped != StopReason::Interrupted
-    }
-
-    /// What was rendered, filtered once [`Taken::finish`] has done so.
-    pub fn film(&self) -> &Film {
-        &self.outcome.film
-    }
-
-    /// The same, before it is written.
-    pub fn film_mut(&mut self) -> &mut Film {
-        &mut self.outcome.film
-    }
-
-    /// Writes what was rendered, filters it, and tells how it went. Of one that is `alone`, and no frame of many, one file is written
-    /// before it is filtered, too: the noisy image is there whatever becomes of the filter, which a signal ends. So does one at the end.
-    ///
-    /// # Errors
-    /// Of every kind; an output that fails keeps no other from being written.
-    pub fn finish(&mut self, args: &Args, alone: bool) -> Result<Ended> {
-        let whole = self.is_whole();
-        let Self { outcome, noisy, files, checkpoint } = self;
-        let Outcome { gpu, film, host, status, plan, notes, .. } = &mut *outcome;
-        if let Some((method, noisy)) = args.denoise.zip(noisy.take()).filter(|_| whole) {
-            if alone {
-                let item = outputs::before_filter(args, film);
-                let save = || Ok(outputs::save(item.as_slice(), film, files, checkpoint.take(), true));
-                let line = outputs::unfiltered(&host.time("write", save)?);
-                let line = files.with_failures(&line);
-                if interrupt::leave_at_once(&line) {
-                    interrupt::leave(&line);
-                }
-            }
-            let planned = plan.is_some();
-            let (times, told) = host.time("denoise", || denoised(gpu, method, noisy, film, planned))?;
-            status.times.extend(times);
-            *notes = told;
-        }
-        let save = || Ok(outputs::save(&outputs::items(args, film), film, files, checkpoint.take(), whole));
-        let mut written = host.time("write", save)?;
-        fail_on_messages(gpu)?;
-        let mut more: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
-        more.extend(planned::item(args, plan.as_ref())?);
-        files.save(&more, whole);
-        written.extend(files.pipe(&outputs::items(args, film), whole));
-        files.pipe(&more, whole);
-        if alone {
-            files.end();
-        }
-        let summary = outcome.summary(&written);
-        args.common.report(&summary, || text(args, &summary))?;
-        files.failure().map_or(Ok(()), Err)?;
-        Ok(Ended { exit: if whole { Exit::Done } else { Exit::Interrupted }, written })
-    }
+    Ok(Exit::Done)
 }
 
 /// The settings are checked before what may take long.
@@ -299,7 +182,9 @@ impl Taken<'_> {
 /// Of usage and input.
 pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
     let mut file = SceneFile::open_clip(&args.scene, args.clip.as_deref())?;
-    args.camera.as_deref().map_or(Ok(()), |name| file.look_through(name))?;
+    if let Some(name) = &args.camera {
+        file.look_through(name)?;
+    }
     file.stays_still();
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
@@ -337,30 +222,6 @@ fn renderer(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings) -> Resul
     }
 }
 
-/// Always told: it is a bug, or light too strong for the numbers.
-fn warn_of_broken(broken: &BrokenSamples) {
-    let BrokenSamples { count, pixel: [x, y], sample, seed } = broken;
-    complain(&format!(
-        "warning: samples that were no number and count as black: {count}; the first: pixel ({x}, {y}), sample {sample}, \
-         seed {seed}"
-    ));
-}
-
-/// With the filter's default settings, scaled to the image. A plan has told what error to expect, from renders that it compared.
-fn denoised(
-    gpu: &Gpu,
-    method: Method,
-    noisy: Noisy,
-    film: &mut Film,
-    planned: bool,
-) -> Result<(Vec<PassTime>, Vec<String>)> {
-    let mut clean = Filtered::new(gpu, noisy, &Recipe::new(method))?.join(gpu)?;
-    clean.expected = clean.expected.filter(|_| !planned);
-    let notes = clean.notes();
-    film::replace_colour(film, clean.colour, method.name());
-    Ok((clean.times, notes))
-}
-
 /// A system that is out of memory ends the process hours later without a word; what the filter cannot bind is told before, too.
 ///
 /// # Errors
@@ -371,7 +232,10 @@ pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Re
     let bytes = film::host_bytes(settings, unified).max(while_filtered);
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);
     memory::check_beside_driver(bytes).map_err(|what| Error::Device(refused(what)))?;
-    denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))
+    if denoise.is_some() {
+        filter::check_size(gpu, size, filter::GUIDE_TEXELS)?;
+    }
+    Ok(())
 }
 
 /// Of light that is not traced for every pixel a picture can be made by some filters alone.
@@ -382,11 +246,14 @@ pub fn check_stride(args: &Args, settings: &Settings) -> Result<()> {
     let stride = settings.indirect_stride;
     if args.denoise.is_none() && stride > 1 && args.common.talkative() {
         complain(&format!(
-            "warning: with indirect_stride {stride} most pixels lack indirect light until a filter fills it in: add --denoise, or use \
-             tallow filter on the .exr"
+            "warning: {}: add --denoise, or use tallow filter on the .exr",
+            filter::missing_light(stride)
         ));
     }
-    args.denoise.map_or(Ok(()), |method| method.check_stride(stride))
+    if let Some(method) = args.denoise {
+        method.check_stride(stride)?;
+    }
+    Ok(())
 }
 
 /// What a lens shows of lamps and sky has noise, which filters leave. Given to them with the other light, `guided` spreads it over the
@@ -404,6 +271,8 @@ fn tell_of_lens(args: &Args, scene: &Scene) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::interrupt;
+    use crate::image::Film;
     use clap::Parser;
     use std::path::Path;
     use std::sync::atomic::Ordering;

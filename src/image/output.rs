@@ -6,7 +6,7 @@ use std::fs::Metadata;
 use std::io::{BufWriter, Cursor, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
 use temporary::Temporary;
-pub use temporary::remove_unfinished;
+pub use temporary::{remove_unfinished, with_suffix};
 
 /// A destination for the bytes of a file.
 pub trait Stream: Write + Seek {}
@@ -29,9 +29,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// [`Error::Output`] with what to do about it. `fill` returns [`ErrorKind::InvalidData`] for data that cannot be encoded.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> Result<()> {
-    let result = match is_special(path) {
-        true => write_through(path, fill).map_err(|e| remedy(path, &e)),
-        false => write_renamed(path, fill),
+    let result = if is_special(path) {
+        write_through(path, fill).map_err(|e| remedy(path, &e))
+    } else {
+        write_renamed(path, fill)
     };
     result.map_err(|what| Error::output(path, what))
 }
@@ -117,7 +118,9 @@ fn filled(
     stream.flush()?;
     drop(stream);
     #[cfg(unix)]
-    old.map_or(Ok(()), |old| owner::pass_on(&old, temporary.file()))?;
+    if let Some(old) = old {
+        owner::pass_on(&old, temporary.file())?;
+    }
     // Without this, a crash of the system soon after the renaming could leave an empty file.
     temporary.file().sync_all()?;
     Ok(temporary)

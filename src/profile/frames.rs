@@ -67,7 +67,9 @@ impl Workload<'_> {
     fn run_one(&self, frame: &mut FrameResources) -> Result<PassTime> {
         let begin_ns = gpu::host_ns();
         Job::new(self.renderer).run_to_end(frame)?;
-        self.denoiser.map_or(Ok(()), |denoiser| self.gpu.run(frame, |rec| denoiser.record(rec)).map(drop))?;
+        if let Some(denoiser) = self.denoiser {
+            self.gpu.run(frame, |rec| denoiser.record(rec))?;
+        }
         Ok(PassTime { name: "frame", begin_ns, end_ns: gpu::host_ns() })
     }
 }

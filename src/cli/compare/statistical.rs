@@ -66,14 +66,20 @@ pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
     let outcome = significance::test(a_estimate, b_estimate, &options).map_err(|what| Error::input(a, what))?;
     let report = Report { sides: &sides, options, outcome };
     let full = args.map.as_ref().map(|path| report.write_map(path)).transpose()?;
-    args.junit.as_ref().map_or(Ok(()), |path| output::write(path, junit::text(&report)?.as_bytes()))?;
-    args.html.as_ref().map_or(Ok(()), |path| output::write(path, page::html(&report).as_bytes()))?;
+    if let Some(path) = &args.junit {
+        output::write(path, junit::text(&report)?.as_bytes())?;
+    }
+    if let Some(path) = &args.html {
+        output::write(path, page::html(&report).as_bytes())?;
+    }
     let failed = failed(&report);
-    let folder = args.evidence.as_ref().filter(|_| failed);
-    folder.map_or(Ok(()), |folder| evidence::write(folder, &report))?;
-    match json {
-        true => print_json(&summary(&report, args, full))?,
-        false => print(&text(&report, args, full))?,
+    if let Some(folder) = args.evidence.as_ref().filter(|_| failed) {
+        evidence::write(folder, &report)?;
+    }
+    if json {
+        print_json(&summary(&report, args, full))?;
+    } else {
+        print(&text(&report, args, full))?;
     }
     if failed {
         complain(&words::verdict(&report));
@@ -108,7 +114,10 @@ fn check_outputs(a: &Path, b: &Path, args: &Args) -> Result<()> {
     let mut inputs = vec![("A", a), ("B", b)];
     inputs.extend(args.errors.as_deref().map(|errors| ("--errors", errors)));
     check_distinct(&outputs, &inputs)?;
-    args.evidence.as_ref().map_or(Ok(()), |folder| evidence::check(folder))
+    if let Some(folder) = &args.evidence {
+        evidence::check(folder)?;
+    }
+    Ok(())
 }
 
 fn summary(report: &Report, args: &Args, full: Option<f32>) -> Value {

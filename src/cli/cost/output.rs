@@ -72,15 +72,18 @@ impl Folder {
         let items: Vec<_> =
             NAMES.iter().zip(contents).map(|(name, bytes)| Item::bytes(self.path.join(name), bytes)).collect();
         let written = files.save(&items, whole);
-        if whole && files.failure().is_none() {
+        if whole && files.check().is_ok() {
             files.remove_partial(&items);
         }
         written
     }
 
-    /// Everything that could not be written, as one error.
-    pub fn failure(&self) -> Option<Error> {
-        self.files.borrow().failure()
+    /// Whether all was written so far.
+    ///
+    /// # Errors
+    /// [`Error::Output`] with all failures.
+    pub fn check(&self) -> Result<()> {
+        self.files.borrow().check()
     }
 }
 

@@ -50,7 +50,9 @@ impl Supersampling {
         settings.validate()?;
         let [camera, clip] = CHOICES.map(said);
         let mut file = SceneFile::open_clip(path, clip)?;
-        camera.map_or(Ok(()), |name| file.look_through(name))?;
+        if let Some(name) = camera {
+            file.look_through(name)?;
+        }
         file.stays_still(); // as the render did
         let Loaded { scene, .. } = file.load()?;
         provenance.shows(&scene, &settings).map_err(of_image)?;

@@ -36,7 +36,9 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     settings.validate()?;
     let scene = file.load()?.scene;
     args.common.warn(&scene.warnings);
-    old.map_or(Ok(()), |old| check_beside(old, &scene, &settings, filter))?;
+    if let Some(old) = old {
+        check_beside(old, &scene, &settings, filter)?;
+    }
     let gpu = args.common.open(args.tracing.unwrap_or_default())?;
     render::check_room(args.denoise, &settings, &gpu)?;
     let count = usize::from(args.frames.unwrap_or(FRAMES));

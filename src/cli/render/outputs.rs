@@ -7,7 +7,6 @@ use crate::error::Result;
 use crate::image::difference::false_colours;
 use crate::image::output::{self, Stream};
 use crate::image::{self, Film, WriteOptions};
-use crate::render::film;
 use std::path::{Path, PathBuf};
 
 /// A render may take hours; what cannot be written, or would replace what it is not to, is told before.
@@ -19,8 +18,12 @@ pub fn check(args: &Args) -> Result<()> {
     images.iter().try_for_each(|path| image::check_writable(path))?;
     args.heatmap.iter().try_for_each(|path| check_png("--heatmap", path))?;
     args.profile.iter().try_for_each(|path| output::check(path))?;
-    args.checkpoint.map_or(Ok(()), |_| output::check(&checkpoint))?;
-    planned::to_write(args).map_or(Ok(()), output::check)?;
+    if args.checkpoint.is_some() {
+        output::check(&checkpoint)?;
+    }
+    if let Some(path) = planned::to_write(args) {
+        output::check(path)?;
+    }
     let (layers, colours): (Vec<_>, Vec<_>) =
         images.iter().map(|path| ("-o", path.as_path())).partition(|(_, path)| image::has_layers(path));
     let maps = args.heatmap.iter().map(|path| ("--heatmap", path.as_path()));
@@ -53,7 +56,7 @@ pub fn save(
     if !whole && !written.iter().any(|path| image::has_layers(path)) {
         written.extend(checkpoint.write(files, film));
     }
-    if files.failure().is_none() {
+    if files.check().is_ok() {
         checkpoint.remove(&written);
     }
     written
@@ -69,7 +72,7 @@ pub fn save_pictures(args: &Args, film: &Film) -> Result<()> {
     let mut files = Files::default();
     files.save(&items, true);
     files.pipe(&items, true);
-    files.failure().map_or(Ok(()), Err)
+    files.check()
 }
 
 /// The one image that is written before a filter runs, so that no sample is lost whatever becomes of that: the first file with
@@ -82,10 +85,10 @@ pub fn before_filter<'a>(args: &Args, film: &'a Film) -> Option<Item<'a>> {
 
 /// Says what there is when a signal ends the filter.
 pub fn unfiltered(written: &[PathBuf]) -> String {
-    match written.is_empty() {
-        true => "interrupted: --denoise was not finished, and nothing was written".to_owned(),
-        false => format!("interrupted: the noisy image was written to {}, --denoise was not finished", names(written)),
+    if written.is_empty() {
+        return "interrupted: --denoise was not finished, and nothing was written".to_owned();
     }
+    format!("interrupted: the noisy image was written to {}, --denoise was not finished", names(written))
 }
 
 /// The images: a film's own, and that of its samples.
@@ -110,7 +113,7 @@ fn names(written: &[PathBuf]) -> String {
 
 /// Samples per pixel from 0 (dark) to the largest number (bright).
 fn heatmap(film: &Film, stream: &mut dyn Stream) -> std::io::Result<()> {
-    let counts = film::counts(film, "samples").unwrap_or_default();
+    let counts = film.words("samples").unwrap_or_default();
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     let values: Vec<f32> = counts.iter().map(|&n| n as f32).collect();
     let picture = false_colours(film.width, &values, most as f32);

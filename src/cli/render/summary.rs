@@ -1,15 +1,11 @@
 //! What is said of a render at its end.
-use super::{Args, Spans, planned};
+use super::{Args, planned};
 use crate::cli::readable;
-use crate::gpu::{Gpu, total_ms};
-use crate::image::Film;
 use crate::plan::Plan;
-use crate::render::{Counters, Status, StopReason, film};
+use crate::render::{Counters, StopReason};
 use crate::report::table::{self, PassRow};
-use crate::scene::Scene;
 use crate::statistics::BrokenSamples;
 use serde::Serialize;
-use std::path::PathBuf;
 
 /// What `--json` prints.
 #[derive(Clone, Debug, Serialize)]
@@ -56,60 +52,6 @@ pub struct Summary {
     pub notes: Vec<String>,
     /// What was repaired in the scene.
     pub warnings: Vec<String>,
-}
-
-/// A render that is over.
-pub struct Outcome<'a> {
-    /// What rendered it.
-    pub gpu: &'a Gpu,
-    /// What was rendered.
-    pub scene: &'a Scene,
-    /// Its image.
-    pub film: Film,
-    /// What the host did.
-    pub host: Spans,
-    /// How it ended.
-    pub status: Status,
-    /// Rays and nodes, where they were counted.
-    pub counters: Option<Counters>,
-    /// What was planned, where it was.
-    pub plan: Option<Plan>,
-    /// What the filter says of its work.
-    pub notes: Vec<String>,
-}
-
-impl Outcome<'_> {
-    /// In numbers, with the files that were written.
-    pub fn summary(&self, written: &[PathBuf]) -> Summary {
-        let Self { gpu, scene, film, host, status, counters, plan, notes } = self;
-        let counts = film::counts(film, "samples").unwrap_or_default();
-        let gpu_ms = total_ms(&status.times);
-        let whole = status.stopped != StopReason::Interrupted;
-        let missed = plan.as_ref().filter(|_| whole).and_then(|plan| plan.missed(gpu_ms));
-        Summary {
-            files: written.iter().map(|f| f.display().to_string()).collect(),
-            width: film.width,
-            height: film.height,
-            samples: counts.iter().map(|&n| u64::from(n)).sum(),
-            traced: status.traced,
-            least_samples: counts.iter().copied().min().unwrap_or(0),
-            most_samples: counts.iter().copied().max().unwrap_or(0),
-            stopped: status.stopped,
-            broken_priorities: status.broken_priorities,
-            broken_samples: status.broken_samples,
-            plan: plan.clone(),
-            counters: *counters,
-            load_seconds: host.seconds("load scene"),
-            compile_seconds: host.seconds("upload and compile"),
-            seconds: host.seconds("render"),
-            filter_seconds: host.seconds("denoise"),
-            device: gpu.info().name.clone(),
-            gpu_ms,
-            passes: table::summarise(&status.times),
-            notes: notes.iter().cloned().chain(missed).collect(),
-            warnings: scene.warnings.clone(),
-        }
-    }
 }
 
 /// In words.

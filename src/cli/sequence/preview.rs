@@ -14,10 +14,10 @@ const EDGE: u32 = 480;
 /// # Errors
 /// [`Error::Usage`] for another kind of file, [`Error::Output`].
 pub fn check(path: &Path) -> Result<()> {
-    match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {
-        true => output::check(path),
-        false => Err(Error::Usage(format!("--preview {}: a preview goes to a .gif", path.display()))),
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {
+        return output::check(path);
     }
+    Err(Error::Usage(format!("--preview {}: a preview goes to a .gif", path.display())))
 }
 
 /// Small pictures so far.
@@ -52,7 +52,7 @@ impl Preview {
         let (items, mut files) = ([Item::bytes(path.to_owned(), bytes)], Files::default());
         let written = [files.save(&items, whole), files.pipe(&items, whole)].concat();
         files.end();
-        files.failure().map_or(Ok(written), Err)
+        files.check().map(|()| written)
     }
 
     fn encode(&self, bytes: &mut Vec<u8>, fps: f64) -> std::result::Result<(), ::image::ImageError> {

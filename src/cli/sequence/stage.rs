@@ -4,6 +4,7 @@ use super::preview::Preview;
 use super::survey::Survey;
 use super::{Args, FrameReport};
 use crate::cli::Exit;
+use crate::cli::files::first_with_layers;
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
 use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
@@ -11,7 +12,9 @@ use crate::gpu::{FrameResources, Gpu};
 use crate::image::{self, FILTERED, Film};
 use crate::layout::Effects;
 use crate::render::settings::Settings;
-use crate::render::{Moves, Outputs, Renderer, Reproject, Reprojection, all_effects, called_for, can_carry, finished};
+use crate::render::{
+    Job, Moves, Outputs, Renderer, Reproject, Reprojection, all_effects, called_for, can_carry, finished,
+};
 use crate::scene::animation::{Animation, Turntable};
 use crate::scene::{Change, Loaded, Scene};
 use crate::settings::entry;
@@ -153,13 +156,18 @@ impl<'a> Stage<'a> {
         // What is there of an interrupted frame is of no use: it begins anew, and a .png of it would look like a finished one.
         let Some(mut shot) = shot.filter(render::Taken::is_whole) else { return Ok(Exit::Interrupted) };
         if carries {
-            report.carriage = self.renderer.as_ref().map(Renderer::carriage).transpose()?;
+            report.carriage = Some(self.renderer()?.carriage()?);
         }
-        let exit = shot.finish(&args, false)?.exit;
+        shot.finish(&args, None, false)?;
         show(preview, shot.film(), &args)?;
         self.chain = self.chain.with(&self.scene, &settings, self.reproject)?;
         self.held = self.reproject.map(|_| number);
-        Ok(exit)
+        Ok(Exit::Done)
+    }
+
+    /// The one that [`Self::prepare`] has made.
+    fn renderer(&self) -> Result<&Renderer> {
+        self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))
     }
 
     /// Frames whose samples are carried need numbers of their own.
@@ -173,9 +181,9 @@ impl<'a> Stage<'a> {
 
     /// Takes the samples of a frame.
     fn shoot(&self, args: &render::Args, settings: &Settings, carries: bool) -> Result<Option<render::Taken<'_>>> {
-        let renderer = self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))?;
-        let begun = render::Begun { earlier: None, carries };
-        let mut shot = render::shoot(args, &self.gpu, &self.scene, renderer, begun, Spans::default())?;
+        let renderer = self.renderer()?;
+        let job = Job { carries, ..Job::new(renderer) };
+        let mut shot = render::shoot(args, &self.gpu, &self.scene, job, Spans::default())?;
         if let Some(shot) = shot.as_mut().filter(|_| self.reproject.is_some()) {
             renderer.add_history(shot.film_mut(), &self.scene)?;
             self.chain.tell(shot.film_mut(), &self.scene, settings)?;
@@ -192,15 +200,14 @@ impl<'a> Stage<'a> {
         let Some(film) = self.chain.is_begun().then(|| self.film_of(before)).flatten() else { return Ok(()) };
         self.pose(before, report)?;
         self.prepare(&self.settings_of(before))?;
-        let renderer = self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))?;
-        renderer.take_up(&mut FrameResources::new(&self.gpu)?, &film, &self.scene)?;
+        self.renderer()?.take_up(&mut FrameResources::new(&self.gpu)?, &film, &self.scene)?;
         self.held = Some(before);
         self.pose(number, report)
     }
 
     fn film_of(&self, number: u32) -> Option<Film> {
         let files = self.args.of_frame(number).ok()?.output_files();
-        image::read(files.iter().find(|path| image::has_layers(path))?).ok()
+        image::read(first_with_layers(&files)?).ok()
     }
 
     /// Moves the scene to where it is in a frame.
@@ -239,7 +246,9 @@ impl<'a> Stage<'a> {
             EffectChoice::Auto => self.rest.or(called_for(&self.scene, settings, wanted)),
         };
         let mut renderer = Renderer::specialised(&self.gpu, &self.scene, settings, wanted, effects)?;
-        self.reproject.map_or(Ok(()), |how| renderer.keep_history(how, self.moves))?;
+        if let Some(how) = self.reproject {
+            renderer.keep_history(how, self.moves)?;
+        }
         (self.renderer, self.held) = (Some(renderer), None);
         (self.rest, self.change) = (effects, Change::default());
         Ok(())
@@ -254,7 +263,7 @@ impl<'a> Stage<'a> {
     /// The film of a frame that an earlier run has finished, by what its first file with all layers holds.
     fn finished_film(&self, args: &render::Args, settings: &Settings) -> Option<Film> {
         let files = args.output_files();
-        let first = files.iter().find(|path| image::has_layers(path))?;
+        let first = first_with_layers(&files)?;
         let film = match self.reproject {
             Some(_) => image::read(first).ok().filter(|film| self.chain.ends_in(film, &self.scene, settings))?,
             None => finished(first, &self.scene, settings)?,

@@ -82,8 +82,13 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
     if number == 1 {
         return path.to_owned();
     }
+    with_suffix(path, &format!("-{number}"))
+}
+
+/// The path with a suffix behind the name and before the extension: `a.partial.exr` of `a.exr` and `.partial`.
+pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
-    name.push(format!("-{number}"));
+    name.push(suffix);
     if let Some(extension) = path.extension() {
         name.push(".");
         name.push(extension);

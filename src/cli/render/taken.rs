@@ -1,0 +1,182 @@
+//! A render whose samples are taken: it is filtered, written, and told of.
+use super::shot::Shot;
+use super::summary::{Summary, text};
+use super::{Args, Spans, outputs, planned};
+use crate::cli::checkpoint::CheckpointFile;
+use crate::cli::files::Files;
+use crate::cli::{complain, fail_on_messages, interrupt};
+use crate::denoise::filter::Method;
+use crate::denoise::{Filtered, Noisy, Recipe};
+use crate::error::Result;
+use crate::gpu::{Gpu, total_ms};
+use crate::image::Film;
+use crate::plan::Plan;
+use crate::render::{Counters, Job, Status, StopReason, film};
+use crate::report::table;
+use crate::scene::Scene;
+use crate::statistics::BrokenSamples;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// A render that is over, and nowhere written yet.
+pub struct Taken<'a> {
+    gpu: &'a Gpu,
+    scene: &'a Scene,
+    film: Film,
+    /// What the host did.
+    host: Spans,
+    status: Status,
+    /// Rays and nodes, where they were counted.
+    counters: Option<Counters>,
+    /// What the filter says of its work.
+    notes: Vec<String>,
+    noisy: Option<Noisy>,
+    files: Files,
+    checkpoint: Option<CheckpointFile>,
+}
+
+/// A signal and a checkpoint wait for a step.
+const STEP_TIME: Duration = Duration::from_secs(1);
+
+/// Takes the samples of a job, or of the one pixel that is asked for; none when it was interrupted before the first.
+///
+/// # Errors
+/// [`crate::error::Error::Device`].
+pub fn shoot<'a>(args: &Args, gpu: &'a Gpu, scene: &'a Scene, job: Job, mut host: Spans) -> Result<Option<Taken<'a>>> {
+    let settings = job.renderer.settings();
+    let noisy = args.filter(settings).map(|_| Noisy::of_film(job.renderer)).transpose()?;
+    let pixel = args.pixel.map(|[x, y]| y * settings.width + x);
+    let shot = Shot { args, gpu, job: Job { step_time: Some(STEP_TIME), pixel, ..job } };
+    let mut files = Files::new(args.resume.as_deref());
+    let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
+    if status.stopped == StopReason::Interrupted && status.traced == 0 {
+        return Ok(None);
+    }
+    status.broken_samples.iter().for_each(warn_of_broken);
+    let seconds = host.seconds("render");
+    let film = host.time("read back", || shot.film(&status, seconds))?;
+    let counters = args.counters.then(|| job.renderer.counters()).transpose()?;
+    Ok(Some(Taken { gpu, scene, film, host, status, counters, notes: Vec::new(), noisy, files, checkpoint }))
+}
+
+impl Taken<'_> {
+    /// Whether all of its samples were taken.
+    pub fn is_whole(&self) -> bool {
+        self.status.stopped != StopReason::Interrupted
+    }
+
+    /// What was rendered, filtered once [`Taken::finish`] has done so.
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+
+    /// The same, before it is written.
+    pub fn film_mut(&mut self) -> &mut Film {
+        &mut self.film
+    }
+
+    /// Filters what was rendered, writes it, tells how it went, and returns where the images are. Of one that is `alone`, and
+    /// no frame of many, one file is written before it is filtered, too: the noisy image is there whatever becomes of the filter, which a
+    /// signal ends. So does one at the end.
+    ///
+    /// # Errors
+    /// Of every kind; an output that fails keeps no other from being written.
+    pub fn finish(&mut self, args: &Args, plan: Option<&Plan>, alone: bool) -> Result<Vec<PathBuf>> {
+        let noisy = self.noisy.take().filter(|_| self.is_whole());
+        if let Some((method, noisy)) = args.denoise.zip(noisy) {
+            if alone {
+                self.save_noisy(args)?;
+            }
+            self.filter(method, noisy, plan.is_some())?;
+        }
+        let written = self.write_all(args, plan)?;
+        if alone {
+            self.files.end();
+        }
+        let summary = self.summary(plan, &written);
+        args.common.report(&summary, || text(args, &summary))?;
+        self.files.check()?;
+        Ok(written)
+    }
+
+    /// From here on a signal ends the process, which says where the noisy image is.
+    fn save_noisy(&mut self, args: &Args) -> Result<()> {
+        let Self { film, host, files, checkpoint, .. } = self;
+        let item = outputs::before_filter(args, film);
+        let save = || Ok(outputs::save(item.as_slice(), film, files, checkpoint.take(), true));
+        let line = outputs::unfiltered(&host.time("write", save)?);
+        let line = files.with_failures(&line);
+        if interrupt::leave_at_once(&line) {
+            interrupt::leave(&line);
+        }
+        Ok(())
+    }
+
+    /// With the filter's default settings, scaled to the image. A plan has told what error to expect, from renders that it compared.
+    fn filter(&mut self, method: Method, noisy: Noisy, planned: bool) -> Result<()> {
+        let gpu = self.gpu;
+        let filter = || Filtered::new(gpu, noisy, &Recipe::new(method))?.join(gpu);
+        let mut clean = self.host.time("denoise", filter)?;
+        clean.expected = clean.expected.filter(|_| !planned);
+        self.notes = clean.notes();
+        film::replace_colour(&mut self.film, clean.colour, method.name());
+        self.status.times.extend(clean.times);
+        Ok(())
+    }
+
+    /// Files first, then pipes, which may have no reader; returns the images.
+    fn write_all(&mut self, args: &Args, plan: Option<&Plan>) -> Result<Vec<PathBuf>> {
+        let whole = self.is_whole();
+        let Self { gpu, film, host, status, files, checkpoint, .. } = self;
+        let images = outputs::items(args, film);
+        let save = || Ok(outputs::save(&images, film, files, checkpoint.take(), whole));
+        let mut written = host.time("write", save)?;
+        fail_on_messages(gpu)?;
+        let mut more: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
+        more.extend(planned::item(args, plan)?);
+        files.save(&more, whole);
+        written.extend(files.pipe(&images, whole));
+        files.pipe(&more, whole);
+        Ok(written)
+    }
+
+    /// In numbers, with the plan that it followed and the files that were written.
+    fn summary(&self, plan: Option<&Plan>, written: &[PathBuf]) -> Summary {
+        let Self { gpu, scene, film, host, status, counters, notes, .. } = self;
+        let counts = film.words("samples").unwrap_or_default();
+        let gpu_ms = total_ms(&status.times);
+        let missed = plan.filter(|_| self.is_whole()).and_then(|plan| plan.missed(gpu_ms));
+        Summary {
+            files: written.iter().map(|f| f.display().to_string()).collect(),
+            width: film.width,
+            height: film.height,
+            samples: counts.iter().map(|&n| u64::from(n)).sum(),
+            traced: status.traced,
+            least_samples: counts.iter().copied().min().unwrap_or(0),
+            most_samples: counts.iter().copied().max().unwrap_or(0),
+            stopped: status.stopped,
+            broken_priorities: status.broken_priorities,
+            broken_samples: status.broken_samples,
+            plan: plan.cloned(),
+            counters: *counters,
+            load_seconds: host.seconds("load scene"),
+            compile_seconds: host.seconds("upload and compile"),
+            seconds: host.seconds("render"),
+            filter_seconds: host.seconds("denoise"),
+            device: gpu.info().name.clone(),
+            gpu_ms,
+            passes: table::summarise(&status.times),
+            notes: notes.iter().cloned().chain(missed).collect(),
+            warnings: scene.warnings.clone(),
+        }
+    }
+}
+
+/// Always told: it is a bug, or light too strong for the numbers.
+fn warn_of_broken(broken: &BrokenSamples) {
+    let BrokenSamples { count, pixel: [x, y], sample, seed } = broken;
+    complain(&format!(
+        "warning: samples that were no number and count as black: {count}; the first: pixel ({x}, {y}), sample {sample}, \
+         seed {seed}"
+    ));
+}
