@@ -8,7 +8,7 @@ mod points;
 use super::files::scene_name;
 use super::{Exit, complain, fail_on_messages, interrupt};
 use crate::cost::document::SceneInfo;
-use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, others, reference};
+use crate::cost::{Document, Ended, Images, JudgedFrame, Plan, Watch, key, measure, others, reference};
 use crate::error::{Error, Result};
 use crate::gpu::{self, Gpu};
 use crate::scene::{Scene, SceneFile};
@@ -34,12 +34,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     let warnings = [&scene.warnings[..], &points.notes].concat();
     args.common.warn(&warnings);
     let plan = plan(args, path, &scene, points, &gpu)?;
-    let folder = Folder::open(&args.output)?;
-    let earlier = folder.earlier(&key(&gpu, &scene, &plan));
-    let runs_before = earlier.as_ref().map_or(0, runs);
-    let found = watched(args, &folder, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;
-    fail_on_messages(&gpu)?;
-    finish(args, &folder, found, runs_before, &warnings)
+    let key = key(&gpu, &scene, &plan);
+    measured(args, &gpu, &key, &warnings, |earlier, watch| measure(&gpu, &scene, &plan, earlier, watch))
 }
 
 fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> Result<Plan> {
@@ -51,13 +47,7 @@ fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> R
     let judged = motion.as_ref().map(|motion| motion.judged);
     let command = |candidate| points::command(path, judged, &settings, candidate, gpu.traces_by_ray_query());
     Ok(Plan {
-        scene: SceneInfo {
-            path: path.display().to_string(),
-            name: scene_name(path).to_string_lossy().into_owned(),
-            width,
-            height,
-            judged,
-        },
+        scene: scene_info(path, [width, height], judged),
         commands: candidates.iter().map(command).collect(),
         motion,
         base,
@@ -72,15 +62,34 @@ fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> R
     })
 }
 
-/// Measures with a progress bar. From here on there is something to save, so a signal only asks it to stop.
-fn watched<T>(args: &Args, folder: &Folder, measure: impl FnOnce(&Watch) -> Result<T>) -> Result<T> {
+fn scene_info(path: &Path, [width, height]: [u32; 2], judged: Option<JudgedFrame>) -> SceneInfo {
+    let name = scene_name(path).to_string_lossy().into_owned();
+    SceneInfo { path: path.display().to_string(), name, width, height, judged }
+}
+
+type Found = (Document, Images, Ended);
+
+/// Goes on with an earlier measurement of this key, if there is one, shows a progress bar, and writes what was found. From here on there is
+/// something to save, so a signal only asks it to stop.
+fn measured(
+    args: &Args,
+    gpu: &Gpu,
+    key: &str,
+    warnings: &[String],
+    measure: impl FnOnce(Option<Document>, &Watch) -> Result<Found>,
+) -> Result<Exit> {
+    let folder = Folder::open(&args.output)?;
+    let earlier = folder.earlier(key);
+    let runs_before = earlier.as_ref().map_or(0, runs);
     let stop = interrupt::flag();
     let shown = Shown::new(!args.common.talkative());
     let progress = |what: &str, done: u64, total: u64| shown.set(what, done, total);
     let keep = |document: &Document| folder.keep(document);
-    let found = measure(&Watch { stop: &|| stop.load(Ordering::SeqCst), progress: &progress, keep: &keep });
+    let found = measure(earlier, &Watch { stop: &|| stop.load(Ordering::SeqCst), progress: &progress, keep: &keep });
     shown.finish();
-    found
+    let found = found?;
+    fail_on_messages(gpu)?;
+    finish(args, &folder, found, runs_before, warnings)
 }
 
 /// What `--json` prints.
@@ -96,7 +105,7 @@ struct Report<'a> {
 fn finish(
     args: &Args,
     folder: &Folder,
-    (document, images, ended): (Document, Images, Ended),
+    (document, images, ended): Found,
     runs_before: usize,
     warnings: &[String],
 ) -> Result<Exit> {

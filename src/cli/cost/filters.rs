@@ -1,9 +1,7 @@
 //! `tallow cost --filter-only`: filters on a given image.
-use super::{Args, Folder, finish, runs, watched};
-use crate::cli::files::scene_name;
+use super::{Args, measured, scene_info};
 use crate::cli::filter::options::Overrides;
-use crate::cli::{Exit, fail_on_messages, quoted};
-use crate::cost::document::SceneInfo;
+use crate::cli::{Exit, quoted};
 use crate::cost::filter_only::{FilterCandidate, FilterPlan, key, measure_filters};
 use crate::cost::{grid, reference};
 use crate::denoise::filter::{FilterSettings, Method};
@@ -23,13 +21,7 @@ pub fn run(args: &Args, image: &Path) -> Result<Exit> {
     let plan = FilterPlan {
         path: image,
         film: &film,
-        scene: SceneInfo {
-            path: image.display().to_string(),
-            name: scene_name(image).to_string_lossy().into_owned(),
-            width: size[0],
-            height: size[1],
-            judged: None,
-        },
+        scene: scene_info(image, size, None),
         candidates: candidates(args, image)?,
         repeats: args.repeats,
         order_seed: args.order_seed,
@@ -37,12 +29,7 @@ pub fn run(args: &Args, image: &Path) -> Result<Exit> {
         reference: reference::read(file, size, None)?,
     };
     let gpu = args.common.open(args.tracing)?;
-    let folder = Folder::open(&args.output)?;
-    let earlier = folder.earlier(&key(&gpu, &plan));
-    let runs_before = earlier.as_ref().map_or(0, runs);
-    let found = watched(args, &folder, |watch| measure_filters(&gpu, &plan, earlier, watch))?;
-    fail_on_messages(&gpu)?;
-    finish(args, &folder, found, runs_before, &[])
+    measured(args, &gpu, &key(&gpu, &plan), &[], |earlier, watch| measure_filters(&gpu, &plan, earlier, watch))
 }
 
 /// Every filter, with its defaults and with the options of each variant that changes it.
