@@ -101,9 +101,10 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let mut effects = listed(&args.effects, &scene)?;
     let sizes = (!args.no_measure).then(|| measure(&mut effects, args, scene)).transpose()?;
-    match args.json {
-        true => print_json(&Report { effects, sizes, warnings })?,
-        false => print(&text(&effects, sizes))?,
+    if args.json {
+        print_json(&Report { effects, sizes, warnings })?;
+    } else {
+        print(&text(&effects, sizes))?;
     }
     Ok(Exit::Done)
 }
@@ -284,7 +285,7 @@ fn beside(usual: &mut Variant, other: impl Fn() -> Result<Variant>) -> Result<(C
     Ok((usual.cost, found.cost, pairs))
 }
 
-/// Bytes of the scene's records that only this effect reads. Every new effect needs an entry here.
+/// Bytes of the scene's records that only this effect reads. A new effect with records of its own needs an entry here.
 fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
     let attributes = |bit: u32| {
         let records = scene.shading.iter().filter(|s| s.attributes & bit != 0).count();
@@ -318,41 +319,10 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
             let lights = scene.lights.iter().filter(|light| light.effect() == Some(effect));
             lights.count() * (size_of::<Light>() + size_of::<AliasEntry>())
         }
-        // A sphere takes the record of a triangle, and these lights are only sampled in another way.
-        Effect::spheres | Effect::large_lamps | Effect::two_sided_lamps | Effect::weighed_lights => 0,
         Effect::light_tree => size_of_val(&scene.light_nodes[..]),
-        // Every texture has room for these, and every material for its cutoff.
-        Effect::texture_modes | Effect::hdr_textures | Effect::alpha_cutoff => 0,
-        // Every material has room for the parameters of all BSDFs.
-        Effect::diffuse
-        | Effect::conductor
-        | Effect::dielectric
-        | Effect::coated
-        | Effect::metallic
-        | Effect::clearcoat
-        | Effect::anisotropic
-        | Effect::thin_walls
-        | Effect::clear_walls
-        | Effect::rough
-        | Effect::smooth_interface
-        | Effect::beckmann
-        | Effect::ggx => 0,
-        // These take no record of the scene.
-        Effect::lens
-        | Effect::orthographic
-        | Effect::indirect
-        | Effect::roulette
-        | Effect::clamp
-        | Effect::pixel_filter
-        | Effect::split_light
-        | Effect::soft_light
-        | Effect::sparse_light
-        | Effect::independent_sampler
-        | Effect::counters
-        | Effect::adaptive
-        | Effect::many_samples
-        | Effect::dealt_triangles
-        | Effect::many_texels => 0,
+        // Every texture has room for its modes, and every material for its cutoff and the parameters of all BSDFs; a sphere takes the
+        // record of a triangle, and other effects take none.
+        _ => 0,
     };
     bytes as u64
 }

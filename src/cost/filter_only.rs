@@ -1,4 +1,4 @@
-//! The same for filters alone, on a given image of any renderer: its noise is what it is, so only times vary between runs.
+//! Measures filters alone, on a given image of any renderer: its noise is what it is, so only times vary between runs.
 use super::Images;
 use super::assemble::{Ended, Outline, taken_up};
 use super::document::{Document, Method, Run, SceneInfo, WarmUp};

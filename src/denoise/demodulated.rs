@@ -119,7 +119,8 @@ impl Demodulated {
 
     /// filtered\[T\] of the traced pixels -> filtered\[P\], where not all are
     pub fn record_fill(&self, rec: &mut Recorder) -> Result<()> {
-        self.sparse.as_ref().map_or(Ok(()), |sparse| sparse.record_upsample(rec, &self.planes))
+        let Some(sparse) = &self.sparse else { return Ok(()) };
+        sparse.record_upsample(rec, &self.planes)
     }
 
     /// Direct light for a filter, where it is to be in-painted: what comes out takes the place of the radiance, which must have
@@ -151,9 +152,7 @@ impl Demodulated {
         let bind = remodulate::Bind { filtered: &whole.output, factor: &self.factor, picture: &self.picture };
         rec.dispatch_threads(&self.join, bind, &PackPush { count, ..Default::default() }, count)
     }
-}
 
-impl Demodulated {
     /// What the last split has cut, if anything was to be.
     ///
     /// # Errors
