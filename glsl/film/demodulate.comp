@@ -10,10 +10,12 @@ const uint LIGHT = 0u, ALBEDO = 1u; // values of denoise::Demodulation
 layout(constant_id = 110) const uint DEMODULATION = LIGHT;
 layout(constant_id = 112) const bool INDIRECT_VARIANCE = true; // LIGHT: indirect_m2 is known
 layout(constant_id = 113) const bool MEASURED = true; // any variance of what is filtered is known
+layout(constant_id = 116) const bool LENS = false; // what the lens blurs is filtered as it is
 layout(scalar, binding = 3) writeonly buffer Radiance { vec4 radiance[]; };
 layout(scalar, binding = 4) writeonly buffer Variance { vec3 variance[]; };
 layout(scalar, binding = 5) writeonly buffer Factor { vec4 factor[]; };
 layout(scalar, binding = 6) writeonly buffer Sharp { vec4 sharp[]; };
+layout(binding = 7) uniform samplerBuffer blur; // of float, where the lens counts: how far it blurs what a pixel shows
 layout(scalar, push_constant) uniform Push { SizePush push; };
 
 // A pixel with less than the share WHOLE of a neighbour's albedo, or more than OUTLIER times its neighbours' median light, may
@@ -97,6 +99,18 @@ Parts demodulated(int i) {
     return Parts(colour_at(i), vec3(1.0), vec3(0.0));
 }
 
+float blur_at(int i) { return LENS ? texelFetch(blur, i).r : 0.0; }
+
+// Through a lens, textures and shadows that are out of focus are smooth, and their noise is that of the samples: the share that is blurred
+// is filtered with all other light.
+Parts blurred(Parts p, int i) {
+    float share = blur_at(i);
+    p.sharp *= 1.0 - share;
+    p.factor = mix(p.factor, vec3(1.0), share);
+    p.filtered = number((colour_at(i) - p.sharp) / p.factor);
+    return p;
+}
+
 // Of the pixel's mean, per channel.
 vec3 variance_of_colour(int i, float count) {
     float freedom = count > 1.0 ? count * (count - 1.0) : 0.0;
@@ -112,7 +126,9 @@ vec3 variance_of_filtered(int i, Parts p, float count) {
     if (DEMODULATION == LIGHT && INDIRECT_VARIANCE) {
         PixelLight l = PixelLight_load(light, i);
         float of_mean = count > 1.0 ? l.indirect_m2 / (count * (count - 1.0)) : 0.0;
-        vec3 deviation = p.filtered * number(sqrt(of_mean) / abs(luminance(colour_at(i) - l.direct)));
+        vec3 other = colour_at(i) - l.direct;
+        vec3 deviation = (LENS ? other : p.filtered) * number(sqrt(of_mean) / abs(luminance(other)));
+        if (LENS) deviation = number(mix(deviation, sqrt(variance_of_colour(i, count)), blur_at(i)) / factor);
         return deviation * deviation;
     }
     return mix(vec3(0.0), variance_of_colour(i, count) / (factor * factor), greaterThan(factor, vec3(0.0)));
@@ -129,6 +145,7 @@ void main() {
     if (i >= push.size.x * push.size.y) return;
     float count = count_at(int(i));
     Parts p = demodulated(int(i));
+    if (LENS) p = blurred(p, int(i));
     // Pixels whose filtered part is not used get count 0, so that they do not reach others.
     bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));
     radiance[i] = vec4(p.filtered, known ? count : 0.0);

@@ -1,4 +1,5 @@
 // Points of surfaces as they are kept from frame to frame.
+#include "shared/frame.glsl"
 #include "shared/surface.glsl"
 
 // Lambertian reflection alone is the same in every direction.
@@ -17,9 +18,4 @@ vec3 film_from_point(Camera camera, vec3 point, uvec2 size) {
     float det = dot(camera.forward, across), along = dot(off, across) / det;
     vec2 film = vec2(dot(off, cross(camera.up, camera.forward)), dot(off, cross(camera.forward, camera.right))) / (det * along);
     return vec3((film * vec2(0.5, -0.5) + 0.5) * vec2(size), along);
-}
-
-// Width of a pixel in the middle of the film, at distance 1.
-float pixel_width(Camera camera, uvec2 size) {
-    return 2.0 * max(length(camera.right) / float(size.x), length(camera.up) / float(size.y));
 }

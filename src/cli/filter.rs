@@ -277,6 +277,7 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime
     let recipe = Recipe {
         method: args.filter,
         demodulation: demodulation(args),
+        looked_up: args.supersampling.scene.is_some(),
         fireflies: args.fireflies.unwrap_or_default(),
         settings: &|scales| args.overrides.settings(FilterSettings::default().scaled_by(scales)),
     };

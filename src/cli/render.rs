@@ -15,7 +15,6 @@ use crate::denoise::filter::{self, Method};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Tracing};
 use crate::image;
-use crate::layout::Effects;
 use crate::memory;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Checkpoint, Job, Outputs, Renderer, all_effects, film};
@@ -256,14 +255,12 @@ pub fn check_stride(args: &Args, settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// What a lens shows of lamps and sky has noise, which filters leave. Given to them with the other light, `guided` spreads it over the
-/// picture (a Cornell box at 32 samples: relMSE 1.3), `auto` loses a fifth of the light of small lamps out of focus, and `svgf` a third.
+/// What a lens blurs has noise, of which most filters leave that of sharp light, lamps and sky.
 fn tell_of_lens(args: &Args, scene: &Scene) {
-    let filters = args.denoise.is_some_and(|method| !method.is_none() && !matches!(method, Method::Oidn));
-    let Effects { lens, emissive, environment, .. } = light_and_camera_effects(scene);
-    if filters && lens && (emissive || environment) && args.common.talkative() {
+    let leaves = args.denoise.is_some_and(|method| method.leaves_noise_of_lens());
+    if leaves && light_and_camera_effects(scene).lens && args.common.talkative() {
         complain(
-            "note: what the lens shows of lamps and sky is not filtered: where they are out of focus, take more samples for less noise",
+            "note: this filter leaves the noise of direct light, lamps and sky where the lens blurs them: auto and svgf filter it",
         );
     }
 }

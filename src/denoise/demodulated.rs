@@ -35,8 +35,9 @@ struct Direct {
 }
 
 impl Demodulated {
-    /// For `noisy` and images that hold the same. With `in_paint`, pixels without direct light take it from the others. Of what is
-    /// filtered, `fireflies` are cut.
+    /// For `noisy` and images that hold the same. With `blurred`, the share of a pixel that its
+    /// lens blurs is filtered as it is. With `in_paint`, pixels without direct light take it from the others. Of what is filtered, `fireflies`
+    /// are cut.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the planes do not fit.
@@ -44,6 +45,7 @@ impl Demodulated {
         gpu: &Gpu,
         noisy: &Noisy,
         demodulation: Demodulation,
+        blurred: bool,
         in_paint: bool,
         fireflies: Fireflies,
     ) -> Result<Self> {
@@ -53,6 +55,7 @@ impl Demodulated {
             demodulation: demodulation as u32,
             indirect_variance: holds.indirect_variance,
             measured,
+            lens: blurred && holds.blur && !in_paint,
             noisy: holds.constants(),
             ..Default::default()
         };
@@ -98,6 +101,7 @@ impl Demodulated {
             variance: &self.variance,
             factor: &self.factor,
             sharp: &self.picture,
+            blur: &noisy.blur,
         };
         rec.dispatch_threads(&self.split, bind, &SizePush { size, ..Default::default() }, count)?;
         if let Some(sparse) = &self.sparse {

@@ -52,7 +52,7 @@ impl Denoiser {
             let what = "a frame with an indirect_stride needs samples in every pixel: set min_spp to 1 or more";
             return Err(Error::Usage(what.to_owned()));
         }
-        let parts = Demodulated::new(gpu, &noisy, demodulation, in_paint, Fireflies::Off)?;
+        let parts = Demodulated::new(gpu, &noisy, demodulation, row.weighs_noise, in_paint, Fireflies::Off)?;
         Ok(Self { filter: row.compile(gpu, settings, parts.planes.size)?, parts, noisy })
     }
 

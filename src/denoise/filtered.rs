@@ -20,6 +20,8 @@ pub struct Recipe<'a> {
     /// What is kept away from the filter, where the image tells it and the filter does not want the colour whole. By default
     /// [`Holds::usual_demodulation`].
     pub demodulation: Option<Demodulation>,
+    /// Whether the light is looked up along more rays, whose albedo it is multiplied by: see [`Filtered::join_reflected`].
+    pub looked_up: bool,
     /// What is cut first: see [`Recipe::fireflies`].
     pub fireflies: Fireflies,
     /// The settings for light of these scales.
@@ -30,13 +32,18 @@ impl Recipe<'_> {
     /// By this filter at its default settings, as `tallow render --denoise` uses it.
     pub fn new(method: Method) -> Self {
         let settings = &|scales: &Scales| FilterSettings::default().scaled_by(scales);
-        Self { method, demodulation: None, fireflies: Fireflies::Usual, settings }
+        Self { method, demodulation: None, looked_up: false, fireflies: Fireflies::Usual, settings }
     }
 
     /// What is cut. Unless it is asked for, nothing where nothing is filtered, nor for Open Image Denoise, which wants the colour whole.
     pub fn fireflies(&self) -> Fireflies {
         let takes_apart = matches!(self.method, Method::Kernels(_)) && !self.method.is_none();
         if self.fireflies == Fireflies::Usual && !takes_apart { Fireflies::Off } else { self.fireflies }
+    }
+
+    /// Whether what a lens blurs is filtered as it is.
+    pub fn blurred(&self) -> bool {
+        self.method.weighs_noise() && !self.looked_up
     }
 
     /// What is kept away from the filter of an image that holds this.
@@ -99,7 +106,7 @@ impl Filtered {
         recipe.method.check_stride(noisy.holds().indirect_stride)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
-        let parts = Demodulated::new(gpu, &noisy, demodulation, in_painted, recipe.fireflies())?;
+        let parts = Demodulated::new(gpu, &noisy, demodulation, recipe.blurred(), in_painted, recipe.fireflies())?;
         let mut times = run(gpu, |rec| parts.record_split(rec, &noisy))?;
         drop(noisy);
         let removed = parts.removed()?;
@@ -157,7 +164,7 @@ impl Filtered {
 /// it was taken from or, later, the filter's own. The host holds a window.
 pub fn bytes_per_pixel(method: Method) -> u64 {
     let planes = size_of::<Guide>() + 6 * size_of::<vec4>() + size_of::<vec3>();
-    let taken_from = size_of::<PixelStats>() + size_of::<PixelLight>();
+    let taken_from = size_of::<PixelStats>() + size_of::<PixelLight>() + size_of::<f32>();
     planes as u64 + method.device_bytes().max(taken_from as u64)
 }
 

@@ -21,6 +21,8 @@ pub struct Holds {
     pub indirect_variance: bool,
     /// Direct light holds none of lamps and sky.
     pub sharp_direct: bool,
+    /// It is known how far a lens blurs what each pixel shows.
+    pub blur: bool,
     /// Distance along both axes between pixels whose indirect light is known: see
     /// [`Settings::indirect_stride`](crate::render::settings::Settings::indirect_stride).
     pub indirect_stride: u32,
@@ -28,7 +30,7 @@ pub struct Holds {
 
 impl Holds {
     /// What a renderer leaves.
-    pub fn film(split_light: bool, sharp_direct: bool, indirect_stride: u32) -> Self {
+    pub fn film(split_light: bool, sharp_direct: bool, blur: bool, indirect_stride: u32) -> Self {
         Self {
             of_file: false,
             albedo: true,
@@ -36,6 +38,7 @@ impl Holds {
             variance: true,
             indirect_variance: split_light,
             sharp_direct,
+            blur,
             indirect_stride,
         }
     }
@@ -76,6 +79,8 @@ pub struct Noisy {
     /// One element where direct and indirect light are not kept apart.
     pub(super) light: Buffer<PixelLight>,
     pub(super) guide: Buffer<Guide>,
+    /// One element where no lens blurs anything.
+    pub(super) blur: Buffer<f32>,
     pub(super) holds: Holds,
 }
 
@@ -99,8 +104,14 @@ impl Noisy {
             size: [settings.width, settings.height],
             stats: tiles[0].stats.clone(),
             light: tiles[0].light.clone(),
+            blur: tiles[0].blur.clone(),
             guide: if tiles[0].has_seen() { &tiles[0].seen } else { &tiles[0].guide }.clone(),
-            holds: Holds::film(outputs.split_light, renderer.sharp_direct(), settings.indirect_stride),
+            holds: Holds::film(
+                outputs.split_light,
+                renderer.sharp_direct(),
+                tiles[0].has_blur(),
+                settings.indirect_stride,
+            ),
         })
     }
 

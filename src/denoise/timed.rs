@@ -63,7 +63,8 @@ fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
     filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
     let before = gpu.allocated_bytes();
     let begun = Instant::now();
-    let parts = Demodulated::new(gpu, &noisy, recipe.demodulation(noisy.holds()), false, recipe.fireflies())?;
+    let parts =
+        Demodulated::new(gpu, &noisy, recipe.demodulation(noisy.holds()), recipe.blurred(), false, recipe.fireflies())?;
     let compile = begun.elapsed();
     let device_bytes = gpu.allocated_bytes().saturating_sub(before);
     let once = || -> Result<(Vec<PassTime>, Duration)> {
@@ -96,7 +97,7 @@ impl<'a> Chain<'a> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
-        let parts = Demodulated::new(gpu, &noisy, demodulation, in_paint, recipe.fireflies())?;
+        let parts = Demodulated::new(gpu, &noisy, demodulation, recipe.blurred(), in_paint, recipe.fireflies())?;
         // The scales that settings count in are those of the light that is filtered.
         gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
         let scales = Scales::of_planes(&parts.planes)?;

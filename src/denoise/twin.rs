@@ -22,6 +22,8 @@ pub struct Pixels {
     pub light: Vec<PixelLight>,
     /// One per pixel.
     pub guide: Vec<Guide>,
+    /// How far the lens blurs what each pixel shows; empty where it is not asked for.
+    pub blur: Vec<f32>,
 }
 
 /// An image taken apart.
@@ -47,7 +49,8 @@ impl Pixels {
             holds: layers.holds(),
             stats: pixels.clone().map(|i| layers.stats(i)).collect(),
             light: pixels.clone().map(|i| layers.light(i)).collect(),
-            guide: pixels.map(|i| layers.guide(i)).collect(),
+            guide: pixels.clone().map(|i| layers.guide(i)).collect(),
+            blur: if layers.holds().blur { pixels.map(|i| layers.blur(i)).collect() } else { Vec::new() },
         }
     }
 
@@ -73,9 +76,10 @@ pub fn split(aovs: &Aovs, demodulation: Demodulation) -> Parts {
 
 /// Twin of `demodulate.comp` and, with `in_paint`, `demodulate_direct.comp`.
 pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -> Parts {
+    let blur = |i: usize| pixels.blur.get(i).filter(|_| !in_paint).copied();
     let all = 0..pixels.stats.len();
     let demodulation = pixels.holds.demodulation(demodulation);
-    let parts: Vec<Part> = all.clone().map(|i| part(pixels, demodulation, i)).collect();
+    let parts: Vec<Part> = all.clone().map(|i| blurred(pixels, i, blur(i), part(pixels, demodulation, i))).collect();
     let factor: Vec<vec3> = parts.iter().map(|p| p.factor).collect();
     let radiance = |i: usize| {
         let [r, g, b] = parts[i].filtered;
@@ -84,7 +88,7 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
     };
     let measured = pixels.holds.variance_of_filtered(demodulation);
     let variance: Option<Vec<vec3>> =
-        measured.then(|| all.clone().map(|i| variance(pixels, demodulation, i, &parts[i])).collect());
+        measured.then(|| all.clone().map(|i| variance(pixels, demodulation, i, blur(i), &parts[i])).collect());
     let of_filtered =
         |i: usize| variance.as_ref().map(|v| Vec3::from(factor[i]) * Vec3::from(factor[i]) * Vec3::from(v[i]));
     let rest = |i: usize| of_filtered(i).map_or(0.0, |filtered| variance_of_sharp(pixels, i, filtered));
@@ -161,13 +165,26 @@ fn split_light(pixels: &Pixels, i: usize) -> Part {
     Part { filtered: std::array::from_fn(filtered), factor, sharp: direct.map(number) }
 }
 
+/// What the lens blurs is filtered as it is.
+fn blurred(pixels: &Pixels, i: usize, blur: Option<f32>, p: Part) -> Part {
+    let Some(share) = blur else { return p };
+    let factor = p.factor.map(|v| v * (1.0 - share) + share);
+    let sharp = p.sharp.map(|v| v * (1.0 - share));
+    let filtered = std::array::from_fn(|c| number((pixels.stats[i].mean[c] - sharp[c]) / factor[c]));
+    Part { filtered, factor, sharp }
+}
+
 /// Of the mean of what is filtered.
-fn variance(pixels: &Pixels, demodulation: Demodulation, i: usize, Part { filtered, factor, .. }: &Part) -> vec3 {
+fn variance(pixels: &Pixels, demodulation: Demodulation, i: usize, blur: Option<f32>, part: &Part) -> vec3 {
+    let Part { filtered, factor, .. } = part;
     if demodulation == Demodulation::Light && pixels.holds.indirect_variance {
         let other = Vec3::from(pixels.stats[i].mean) - Vec3::from(pixels.light[i].direct);
         let of_mean = variance_of_mean(pixels.light[i].indirect_m2, pixels.count(i));
         let relative = number(of_mean.sqrt() / luminance(other).abs());
-        return filtered.map(|light| (light * relative).powi(2));
+        let Some(share) = blur else { return filtered.map(|light| (light * relative).powi(2)) };
+        let whole = variance_of_colour(pixels, i);
+        let deviation = |c: usize| number((other[c] * relative * (1.0 - share) + whole[c].sqrt() * share) / factor[c]);
+        return std::array::from_fn(|c| deviation(c).powi(2));
     }
     let all = variance_of_colour(pixels, i);
     std::array::from_fn(|c| if factor[c] > 0.0 { all[c] / (factor[c] * factor[c]) } else { 0.0 })

@@ -206,8 +206,10 @@ pub struct FilmTile {
     pub light: Buffer<PixelLight>,
     /// Per pixel, where guides are wanted.
     pub guide: Buffer<Guide>,
-    /// Per pixel, where guides are wanted and the scene has smooth surfaces: what they show, and all others themselves.
+    /// Per pixel, where guides are wanted and the scene has smooth surfaces or the camera a lens: what these show.
     pub seen: Buffer<Guide>,
+    /// Per pixel, where guides are wanted and the camera has a lens: how far it blurs what is seen, from 0, sharp, to 1.
+    pub blur: Buffer<f32>,
     /// Per pixel, where a history is kept: the points that its samples are of.
     pub points: Buffer<SurfacePoint>,
     kept: Kept,
@@ -227,6 +229,7 @@ struct Kept {
     light: bool,
     guide: bool,
     seen: bool,
+    blur: bool,
     points: bool,
 }
 
@@ -247,9 +250,14 @@ impl FilmTile {
         self.kept.guide
     }
 
-    /// Whether it holds what is seen in smooth surfaces.
+    /// Whether it holds what is seen in smooth surfaces or through a lens.
     pub fn has_seen(&self) -> bool {
         self.kept.seen
+    }
+
+    /// Whether it holds how far the lens blurs what is seen.
+    pub fn has_blur(&self) -> bool {
+        self.kept.blur
     }
 
     /// Whether it holds the points of primary hits.
@@ -266,7 +274,8 @@ impl FilmTile {
     fn new(gpu: &Gpu, range: Range<u32>, window: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let pixels = range.end - range.start;
         let room = |on: bool| if on { pixels as usize } else { 1 };
-        let (light, seen) = (effects.split_light, guides && effects.smooth_interface);
+        let (light, blur) = (effects.split_light, guides && effects.lens);
+        let seen = blur || guides && effects.smooth_interface;
         Ok(Self {
             first_pixel: range.start,
             pixels,
@@ -275,8 +284,9 @@ impl FilmTile {
             light: Buffer::new(gpu, "light", room(light), Location::Device)?,
             guide: Buffer::new(gpu, "guide", room(guides), Location::Device)?,
             seen: Buffer::new(gpu, "seen", room(seen), Location::Device)?,
+            blur: Buffer::new(gpu, "blur of the lens", room(blur), Location::Device)?,
             points: Buffer::new(gpu, "points", 1, Location::Device)?, // Renderer::keep_history makes room
-            kept: Kept { light, guide: guides, seen, points: false },
+            kept: Kept { light, guide: guides, seen, blur, points: false },
         })
     }
 }
@@ -325,7 +335,7 @@ impl FilmBuffers {
     /// What a pixel takes where all outputs are wanted, samples in flight not counted.
     pub fn bytes_per_pixel(placed: bool) -> u64 {
         const PLACED: usize = Counts::BYTES_PER_PIXEL + size_of::<f32>(); // and a policy's own
-        let records = size_of::<PixelStats>() + size_of::<PixelLight>() + 2 * size_of::<Guide>();
+        let records = size_of::<PixelStats>() + size_of::<PixelLight>() + 2 * size_of::<Guide>() + size_of::<f32>();
         (records + if placed { PLACED } else { 0 }) as u64
     }
 

@@ -32,6 +32,9 @@ pub(crate) const OF_SAMPLES: &str = "mean of samples";
 /// Sum of squared deviations of the luminance of indirect light times albedo.
 pub(crate) const INDIRECT_M2: &str = "indirect.m2";
 
+/// How far the lens blurs what a pixel shows, from 0, sharp, to 1: only in files of cameras with a lens.
+pub(crate) const BLUR: &str = "denoising blur";
+
 /// What rounding took off the means of pixels with thousands of samples: only in files that have such pixels.
 const REMAINDERS: [&str; 2] = ["remainder", "light.remainder"];
 
@@ -39,7 +42,7 @@ const REMAINDERS: [&str; 2] = ["remainder", "light.remainder"];
 const BROKEN: &str = "brokenSamples";
 
 /// Of a film with everything.
-const CHANNELS: usize = 37;
+const CHANNELS: usize = 38;
 
 /// What a pixel takes in a film with everything.
 pub(crate) fn bytes_per_pixel(placed: bool) -> u64 {
@@ -88,6 +91,7 @@ struct Records {
     light: Vec<PixelLight>,
     guide: Vec<Guide>,
     seen: Vec<Guide>,
+    blur: Vec<f32>,
 }
 
 impl Records {
@@ -98,6 +102,7 @@ impl Records {
         Ok(Self {
             guide: guide(outputs.guides, &tile.guide)?,
             seen: guide(tile.has_seen(), &tile.seen)?,
+            blur: if tile.has_blur() { tile.blur.read_range(pixels.clone())? } else { Vec::new() },
             light: if outputs.split_light { tile.light.read_range(pixels.clone())? } else { Vec::new() },
             stats: tile.stats.read_range(pixels)?,
         })
@@ -124,6 +129,9 @@ impl Records {
         }
         if !seen.is_empty() {
             add_seen(&mut film, seen);
+        }
+        if !self.blur.is_empty() {
+            film.add(BLUR, Samples::F32(run(&self.blur, first).to_vec()));
         }
         film
     }
@@ -314,7 +322,7 @@ fn add_guide(film: &mut Film, guide: &[Guide]) {
     film.add("id", Samples::U32(guide.iter().map(|g| g.object).collect()));
 }
 
-/// What is seen in smooth surfaces, by the names of Blender's layers for filters.
+/// What is seen in smooth surfaces or through a lens, by the names of Blender's layers for filters.
 fn add_seen(film: &mut Film, seen: &[Guide]) {
     film.add_vec3("denoising normal", XYZ, &seen.iter().map(|g| g.normal).collect::<Vec<_>>());
     film.add_vec3("denoising position", XYZ, &seen.iter().map(|g| g.position).collect::<Vec<_>>());
@@ -327,13 +335,13 @@ mod tests {
 
     #[test]
     fn a_film_takes_its_records_and_its_channels() {
-        // Statistics, light, a guide and another of what is seen; 37 channels. Placed: 24 bytes more, and 2 channels.
-        let records = (size_of::<PixelStats>() + size_of::<PixelLight>() + 2 * size_of::<Guide>()) as u64;
+        // Statistics, light, a guide, another of what is seen, and the lens's blur; 38 channels. Placed: 24 bytes more, and 2 channels.
+        let records = (size_of::<PixelStats>() + size_of::<PixelLight>() + 2 * size_of::<Guide>() + 4) as u64;
         let mut settings = Settings { width: 3, height: 2, ..Settings::default() };
-        assert_eq!(host_bytes(&settings, true), 6 * (records + 4 * 37));
+        assert_eq!(host_bytes(&settings, true), 6 * (records + 4 * 38));
         settings.allocate.policy = &crate::allocate::both::ROW;
-        assert_eq!(host_bytes(&settings, false), 6 * 4 * 39);
-        assert_eq!(host_bytes(&settings, true), 6 * (records + 24 + 4 * 39));
+        assert_eq!(host_bytes(&settings, false), 6 * 4 * 40);
+        assert_eq!(host_bytes(&settings, true), 6 * (records + 24 + 4 * 40));
     }
 
     #[test]
@@ -351,6 +359,7 @@ mod tests {
         add_pixels(&mut film, &[PixelStats::default()], &[PixelLight::default()]);
         add_guide(&mut film, &[Guide::default()]);
         add_seen(&mut film, &[Guide::default()]);
+        film.add(BLUR, Samples::F32(vec![0.0]));
         assert_eq!(film.channels.len(), CHANNELS);
     }
 }

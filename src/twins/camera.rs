@@ -3,6 +3,7 @@ use crate::layout::{Camera, Effects, FrameConstants, PIXEL_FILTER_GAUSSIAN, PIXE
 use crate::math::hash::pcg;
 use crate::math::warp::{warp_disk, warp_gaussian, warp_tent};
 use crate::shaders::shared::camera::{PAIR_FILM, PAIR_LENS};
+use crate::shaders::shared::lens::{BLURRED_RADIUS, SHARP_RADIUS};
 use crate::twins::sampler::{Sampler, sample_2d};
 use glam::{Vec2, Vec3, vec2};
 
@@ -31,10 +32,21 @@ pub fn film_from_point(camera: &Camera, point: Vec3, size: [u32; 2]) -> Vec3 {
     ((film * vec2(0.5, -0.5) + 0.5) * vec2(size[0] as f32, size[1] as f32)).extend(along)
 }
 
-/// Width of a pixel in the middle of the film, at distance 1.
+/// Width of a pixel in the middle of the film, at distance 1 or, where rays are parallel, at any.
 pub fn pixel_width(camera: &Camera, size: [u32; 2]) -> f32 {
     let of = |edge: [f32; 3], pixels: u32| Vec3::from(edge).length() / pixels as f32;
     2.0 * of(camera.right, size[0]).max(of(camera.up, size[1]))
+}
+
+/// How far the lens blurs what lies at a distance along the view direction, from 0, sharp, to 1. Twin of the function in
+/// `glsl/shared/lens.glsl`.
+pub fn lens_blur(camera: &Camera, along: f32, size: [u32; 2]) -> f32 {
+    let along = along.clamp(1e-18, 1e18);
+    let scale = if camera.orthographic != 0 { along } else { 1.0 };
+    let off = (1.0 / camera.focus_distance.max(1e-20) - 1.0 / along).abs() * scale;
+    let radius = camera.lens_radius * off / pixel_width(camera, size);
+    let t = ((radius - SHARP_RADIUS) / (BLURRED_RADIUS - SHARP_RADIUS)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }
 
 /// `lens` in [0, 1)^2 matters only to a lens of positive radius.
@@ -83,6 +95,32 @@ pub fn path_seed(frame: &FrameConstants, pixel: u32, index: u32) -> u32 {
 mod tests {
     use super::*;
     use std::collections::HashSet;
+
+    /// A film of 100 pixels that spans 2 at distance 1 and 8 at the focus, 4: a point at distance z spreads over .2 |4 - z| / z there, in
+    /// pixels of .08. Where rays are parallel over a film of 2, over .2 |4 - z| / 4 in pixels of .02.
+    #[test]
+    fn a_lens_blurs_by_the_circle_of_confusion() {
+        let lens = Camera {
+            right: [1.0, 0.0, 0.0],
+            up: [0.0, 1.0, 0.0],
+            forward: [0.0, 0.0, -1.0],
+            lens_radius: 0.2,
+            focus_distance: 4.0,
+            ..Default::default()
+        };
+        let smooth = |radius: f32| {
+            let t = ((radius - 0.5) / 1.5).clamp(0.0, 1.0);
+            t * t * (3.0 - 2.0 * t)
+        };
+        let parallel = Camera { orthographic: 1, ..lens };
+        for along in [1.0f32, 2.0, 2.9, 3.0, 3.3, 4.0, 5.0, 6.0, 8.0, 1e30] {
+            let expected = smooth(0.2 * (4.0 - along).abs() / along / 0.08);
+            assert!((lens_blur(&lens, along, [100, 100]) - expected).abs() < 1e-4, "{along}: {expected}");
+            let expected = smooth(0.2 * (4.0 - along).abs() / 4.0 / 0.02);
+            assert!((lens_blur(&parallel, along, [100, 100]) - expected).abs() < 1e-4, "parallel, {along}: {expected}");
+        }
+        assert_eq!([0.0, 4.0, 1e30].map(|z| lens_blur(&Camera { lens_radius: 0.0, ..parallel }, z, [9, 9])), [0.0; 3]);
+    }
 
     #[test]
     fn seeds_share_no_numbers_of_masks() {

@@ -2,8 +2,9 @@
 use crate::layout::{Camera, FrameConstants, Guide, NONE, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
+use crate::shaders::primary_hit::LENS_RAYS;
 use crate::twins::bsdf::{bsdf_albedo, bsdf_chooses, bsdf_is_delta, bsdf_sample};
-use crate::twins::camera::{Ray, camera_ray, film_from_pixel};
+use crate::twins::camera::{Ray, camera_ray, film_from_pixel, lens_blur};
 use crate::twins::light::INFINITE_DISTANCE;
 use crate::twins::surface::{View, facing_of, light_share, side_of, surface_at, surface_bsdf, view_of};
 use crate::twins::texture::mask_bits;
@@ -22,6 +23,38 @@ pub fn seen(scene: &Scene, frame: &FrameConstants, pixel: u32) -> Guide {
     seen_hit(scene, frame, &ray, pcg(pixel)).guide
 }
 
+/// The mean of what rays through the lens show at the centre of `pixel`, and how far the lens blurs it.
+pub fn through_lens(scene: &Scene, frame: &FrameConstants, pixel: u32) -> (Guide, f32) {
+    let film = film_from_pixel(centre_of(frame, pixel), frame.path.size);
+    let (mut sum, mut hits, mut blur) = ([Vec3::ZERO; 3], 0.0, 0.0);
+    let mut depths = 0.0;
+    for k in 0..LENS_RAYS {
+        let point = vec2((k as f32 + 0.5) / LENS_RAYS as f32, k.reverse_bits() as f32 * 0.5f32.powi(32));
+        let ray = camera_ray(&frame.camera, film, point);
+        let Guide { normal, position, albedo, depth, .. } =
+            seen_hit(scene, frame, &ray, pcg(pixel).wrapping_add(k + 1)).guide;
+        let distance = if depth > 0.0 { depth } else { INFINITE_DISTANCE };
+        blur += lens_blur(&frame.camera, distance * ray.direction.dot(frame.camera.forward.into()), frame.path.size);
+        if depth > 0.0 {
+            hits += 1.0;
+            depths += depth;
+            sum = std::array::from_fn(|i| sum[i] + Vec3::from([normal, position, albedo][i]));
+        }
+    }
+    let [normal, position, albedo] = sum;
+    let rays = LENS_RAYS as f32;
+    let guide = Guide {
+        normal: normal.normalize_or_zero().into(),
+        depth: depths / rays,
+        position: (position / f32::max(hits, 1.0)).into(),
+        object: if hits > 0.0 { 0 } else { NONE },
+        albedo: (albedo / rays).into(),
+        material: NONE,
+        ..Default::default()
+    };
+    (guide, blur / rays)
+}
+
 /// The point of that hit.
 pub fn point(scene: &Scene, frame: &FrameConstants, pixel: u32) -> SurfacePoint {
     let ray = centre_ray(frame, pixel);
@@ -31,9 +64,12 @@ pub fn point(scene: &Scene, frame: &FrameConstants, pixel: u32) -> SurfacePoint 
 }
 
 fn centre_ray(frame: &FrameConstants, pixel: u32) -> Ray {
-    let centre = vec2((pixel % frame.path.size[0]) as f32, (pixel / frame.path.size[0]) as f32) + 0.5;
     let camera = Camera { lens_radius: 0.0, ..frame.camera };
-    camera_ray(&camera, film_from_pixel(centre, frame.path.size), Vec2::splat(0.5))
+    camera_ray(&camera, film_from_pixel(centre_of(frame, pixel), frame.path.size), Vec2::splat(0.5))
+}
+
+fn centre_of(frame: &FrameConstants, pixel: u32) -> Vec2 {
+    vec2((pixel % frame.path.size[0]) as f32, (pixel / frame.path.size[0]) as f32) + 0.5
 }
 
 /// What a ray meets first.

@@ -156,7 +156,10 @@ fn noise_that_a_lens_shows_and_a_filter_leaves_is_told() {
         std::fs::write(folder.path().join("s.toml"), scene).unwrap();
         let output = run(&folder, &format!("render s.toml --spp 2 --denoise {filter} -o s.png"));
         assert!(output.status.success(), "{output:?}");
-        String::from_utf8(output.stderr).unwrap().contains("is not filtered")
+        String::from_utf8(output.stderr).unwrap().contains("where the lens blurs")
     };
-    assert_eq!([told(0.1, "auto"), told(0.1, "none"), told(0.0, "auto")], [true, false, false]);
+    assert_eq!(
+        [told(0.1, "atrous"), told(0.1, "auto"), told(0.1, "none"), told(0.0, "atrous")],
+        [true, false, false, false]
+    );
 }

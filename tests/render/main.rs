@@ -6,6 +6,7 @@ mod analytic;
 mod ghosts;
 #[path = "../support/glazed.rs"]
 mod glazed;
+mod lens;
 #[path = "../support/moving.rs"]
 mod moving;
 mod plan;

@@ -27,12 +27,14 @@ struct Frame {
     stats: Vec<PixelStats>,
     light: Vec<PixelLight>,
     guide: Vec<Guide>,
+    /// How far a lens blurs each pixel, if there is one.
+    blur: Vec<f32>,
 }
 
 impl Frame {
     /// Walls of many colours under noise, lamps among them, and with `broken` everything that no frame should hold.
     fn new(size: [u32; 2], broken: bool) -> Self {
-        let mut frame = Self { size, stats: Vec::new(), light: Vec::new(), guide: Vec::new() };
+        let mut frame = Self { size, stats: Vec::new(), light: Vec::new(), guide: Vec::new(), blur: Vec::new() };
         for i in 0..size[0] * size[1] {
             let unit = |salt: u32| hash(i.wrapping_mul(8) + salt) as f32 / 4_294_967_296.0;
             let (is_lamp, is_glass) = (i % 23 == 7, size[0] > 16 && i % size[0] % 16 < 4);
@@ -86,10 +88,19 @@ impl Frame {
         add("N", |f, i| f.guide[i].normal);
         add("P", |f, i| f.guide[i].position);
         film.add("indirect.m2", Samples::F32(self.light.iter().map(|l| l.indirect_m2).collect()));
+        if !self.blur.is_empty() {
+            film.add("denoising blur", Samples::F32(self.blur.clone()));
+        }
         film.add("Z", Samples::F32(self.guide.iter().map(|g| g.depth).collect()));
         film.add("samples", Samples::U32(self.stats.iter().map(|s| s.count).collect()));
         film.metadata.insert("software".to_owned(), "tallow test".to_owned());
         film
+    }
+
+    /// Seen through a lens: sharp, blurred by half and as a whole in turn.
+    fn through_lens(mut self) -> Self {
+        self.blur = (0..self.stats.len()).map(|i| (i % 3) as f32 / 2.0).collect();
+        self
     }
 
     /// Every fifth pixel without a sample, and so without light of its own.
@@ -108,9 +119,10 @@ impl Frame {
         in_paint: bool,
         stride: u32,
     ) -> Vec<vec4> {
-        let Self { size, stats, light, guide } = self;
-        let (stats, light, guide) = (stats.clone(), light.clone(), guide.clone());
-        let pixels = Pixels { size: *size, holds: Holds::film(true, true, stride), stats, light, guide };
+        let Self { size, stats, light, guide, blur } = self;
+        let (stats, light, guide, blur) = (stats.clone(), light.clone(), guide.clone(), blur.clone());
+        let holds = Holds::film(true, true, !blur.is_empty(), stride);
+        let pixels = Pixels { size: *size, holds, stats, light, guide, blur };
         let parts = demodulate(&pixels, demodulation, in_paint);
         if stride == 1 {
             return twins(parts, filter, settings);
@@ -124,7 +136,11 @@ impl Frame {
         let tile = &renderer.film().tiles[0];
         tile.stats.write(0, &self.stats).unwrap();
         tile.light.write(0, &self.light).unwrap();
-        tile.guide.write(0, &self.guide).unwrap();
+        let guide = if tile.has_seen() { &tile.seen } else { &tile.guide };
+        guide.write(0, &self.guide).unwrap();
+        if tile.has_blur() {
+            tile.blur.write(0, &self.blur).unwrap();
+        }
     }
 
     fn on_the_device(
@@ -154,10 +170,10 @@ fn twins(mut parts: Parts, filter: &str, settings: &FilterSettings) -> Vec<vec4>
 }
 
 fn renderer(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str) -> Renderer {
-    renderer_of(gpu, size, outputs, policy, 1)
+    renderer_of(gpu, size, outputs, policy, 1, 0.0)
 }
 
-fn renderer_of(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str, stride: u32) -> Renderer {
+fn renderer_of(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str, stride: u32, lens: f32) -> Renderer {
     let small = |s: &mut Settings| {
         s.indirect_stride = stride;
         [s.width, s.height] = size;
@@ -165,7 +181,8 @@ fn renderer_of(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str, stride
         (s.allocate.policy, s.allocate.min_spp) = (tallow::allocate::policy(policy).unwrap(), 0);
     };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
-    let scene = Scene::load(&file).unwrap().with(small);
+    let mut scene = Scene::load(&file).unwrap().with(small);
+    scene.view.lens_radius = lens;
     Renderer::new(gpu, &scene, &scene.settings, outputs).unwrap()
 }
 
@@ -200,13 +217,39 @@ fn frames_are_taken_apart_and_put_together_as_their_twins() {
     assert_silent(&gpu);
 }
 
+/// By filters that weigh noise; others keep sharp light and textures.
+#[test]
+fn what_a_lens_blurs_is_filtered_as_it_is() {
+    let gpu = gpu();
+    let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
+    for size in SIZES {
+        let renderer = renderer_of(&gpu, size, Outputs::FILTERED, "uniform", 1, 0.1);
+        for broken in [false, true] {
+            let (frame, sharp) = (Frame::new(size, broken).through_lens(), Frame::new(size, broken));
+            for (filter, demodulation, alike) in
+                DEMODULATIONS.iter().map(|d| ("svgf", *d, &frame)).chain([("bilateral", DEMODULATIONS[0], &sharp)])
+            {
+                let device = frame.on_the_device(&gpu, &renderer, filter, &settings, demodulation);
+                let off = |frame: &Frame| {
+                    picture::apart(&device, &frame.on_the_host(filter, &settings, demodulation, false, 1), 1e-3)
+                };
+                assert!(off(alike) < 3e-4, "{filter} {demodulation:?} {size:?}: {}", off(alike));
+                assert!(device.iter().flatten().all(|v| v.is_finite()), "{filter} {demodulation:?} {size:?}");
+                let same = filter != "svgf" || demodulation == Demodulation::Off || size == [1, 1];
+                assert!(same || off(&sharp) > 1e-2, "control: {filter} {demodulation:?} {size:?}");
+            }
+        }
+    }
+    assert_silent(&gpu);
+}
+
 /// Of which indirect light is traced in every third column and row; broken ones hold what no frame should.
 #[test]
 fn sparse_frames_are_filled_in_as_by_their_twins() {
     let gpu = gpu();
     let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
     for size in SIZES {
-        let renderer = renderer_of(&gpu, size, Outputs::FILTERED, "uniform", 3);
+        let renderer = renderer_of(&gpu, size, Outputs::FILTERED, "uniform", 3, 0.0);
         for (frame, filter) in [(Frame::new(size, false), "svgf"), (Frame::new(size, true), "none")] {
             let device = frame.on_the_device(&gpu, &renderer, filter, &settings, Demodulation::Light);
             let host = |stride| frame.on_the_host(filter, &settings, Demodulation::Light, false, stride);
@@ -251,7 +294,7 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
     let of_largest = lacking.map(|missing| (LARGEST, missing)).into_iter();
     let cases = of_largest.chain(SIZES.iter().filter(|&&size| size != LARGEST).map(|&size| (size, lacking[0])));
     for (size, missing) in cases {
-        for frame in [Frame::new(size, false), Frame::new(size, true).sparse()] {
+        for frame in [Frame::new(size, false), Frame::new(size, true).sparse(), Frame::new(size, true).through_lens()] {
             let mut film = frame.film();
             film.channels.retain(|c| !missing.iter().any(|layer| c.name.starts_with(layer)));
             let aovs = Aovs::find(&film, &Names::new()).unwrap();
@@ -260,6 +303,7 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
                 let recipe = Recipe {
                     method: find("svgf").unwrap().into(),
                     demodulation: Some(demodulation),
+                    looked_up: false,
                     fireflies: Fireflies::Off,
                     settings: &|_| settings,
                 };
@@ -288,6 +332,7 @@ fn a_film_and_its_file_become_one_picture() {
             let recipe = Recipe {
                 method: (*row).into(),
                 demodulation: Some(Demodulation::Light),
+                looked_up: false,
                 fireflies: Fireflies::Above(3.0),
                 settings: &settings,
             };
@@ -313,11 +358,12 @@ fn expected_errors_agree_with_their_twin() {
         let renderer = renderer(&gpu, size, Outputs::FILTERED, "uniform");
         frame.upload(&renderer);
         let (method, fireflies) = (auto.into(), Fireflies::Off);
-        let recipe = Recipe { method, demodulation: Some(demodulation), fireflies, settings: &|_| settings };
+        let recipe =
+            Recipe { method, demodulation: Some(demodulation), looked_up: false, fireflies, settings: &|_| settings };
         let filtered = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap();
         let device = filtered.join(&gpu).unwrap().expected.unwrap();
-        let Frame { stats, light, guide, .. } = frame;
-        let pixels = Pixels { size, holds: Holds::film(true, true, 1), stats, light, guide };
+        let Frame { stats, light, guide, blur, .. } = frame;
+        let pixels = Pixels { size, holds: Holds::film(true, true, false, 1), stats, light, guide, blur };
         let parts = demodulate(&pixels, demodulation, false);
         let (output, expected) = estimated(&parts.input, &settings);
         let host = expected::reference(&parts, &output, &expected).unwrap();

@@ -17,7 +17,7 @@ use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
 use tallow::twins::accumulate::fold;
 use tallow::twins::path::{Strategy, Tracer};
-use tallow::twins::primary_hit::{guide, seen};
+use tallow::twins::primary_hit::{guide, seen, through_lens};
 use tallow::twins::texture::mask_bits;
 use tallow::twins::traverse::traverse;
 
@@ -128,8 +128,10 @@ fn spheres() -> Loaded {
 pub struct Pair {
     pub samples: [Vec<Vec3>; 2],
     guides: [Vec<Guide>; 2],
-    /// What smooth surfaces show; nothing in scenes without.
+    /// What smooth surfaces or the lens show; nothing in scenes without.
     seen: [Vec<Guide>; 2],
+    /// How far the lens blurs that.
+    blur: [Vec<f32>; 2],
     stats: [Vec<PixelStats>; 2],
     light: [Vec<PixelLight>; 2],
 }
@@ -164,9 +166,15 @@ pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
     let push_fold = FoldPush { pixels, samples: SAMPLES, ..FoldPush::default() };
     fold(&push_fold, true, &words, &mut stats, &mut light); // of the device's samples: only rounding may differ
     let shown = if tile.has_seen() { tile.seen.read().unwrap() } else { Vec::new() };
+    let blur = if tile.has_blur() { tile.blur.read().unwrap() } else { Vec::new() };
+    let lens = renderer.effects().lens;
+    let show = |p| if lens { through_lens(scene, &frame, p) } else { (seen(scene, &frame, p), 0.0) };
+    let (seen, mut blurred): (Vec<_>, Vec<_>) = (0..shown.len() as u32).into_par_iter().map(show).unzip();
+    blurred.truncate(blur.len());
     Pair {
         samples: [device, host],
-        seen: [shown.clone(), (0..shown.len() as u32).into_par_iter().map(|p| seen(scene, &frame, p)).collect()],
+        seen: [shown, seen],
+        blur: [blur, blurred],
         guides: [tile.guide.read().unwrap(), (0..pixels).into_par_iter().map(|p| guide(scene, &frame, p)).collect()],
         stats: [tile.stats.read().unwrap(), stats],
         light: [tile.light.read().unwrap(), light],
@@ -220,6 +228,9 @@ pub fn check(name: &str, pair: &Pair) {
     // Each surface on the way magnifies what rounding makes of its normal.
     let wrong = pair.seen[0].iter().zip(&pair.seen[1]).filter(|(a, b)| !guides_agree(a, b)).count();
     assert!(wrong <= pair.seen[0].len() / 50, "{name}: {wrong} guides of what is seen differ");
+
+    let wrong = pair.blur[0].iter().zip(&pair.blur[1]).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
+    assert!(wrong <= pair.blur[0].len() / 50, "{name}: the lens blurs {wrong} pixels otherwise");
 
     for (a, b) in pair.stats[0].iter().zip(&pair.stats[1]) {
         assert!(a.count == b.count && near(a.mean, b.mean, 1e-5) && near(a.m2, b.m2, 1e-4), "{name}: {a:?} {b:?}");

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Location};
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats};
-use crate::render::film::{ALBEDO, INDIRECT_STRIDE, SHARP_DIRECT};
+use crate::render::film::{ALBEDO, BLUR, INDIRECT_M2, INDIRECT_STRIDE, SHARP_DIRECT};
 use bytemuck::Pod;
 use glam::Vec3;
 use places::Places;
@@ -20,6 +20,7 @@ pub struct Layers<'a> {
     /// Whether the file tells what surfaces reflect.
     reflects: bool,
     indirect_m2: Option<&'a [f32]>,
+    blur: Option<&'a [f32]>,
     /// Told by the user, or by the file's head, into which pbrt and Cycles write it.
     samples_of_all: Option<f32>,
     /// pbrt stores the variance of one sample, others that of each pixel's mean.
@@ -44,7 +45,8 @@ impl<'a> Layers<'a> {
             aovs,
             places: Places::new(aovs, &mut notes),
             reflects: false,
-            indirect_m2: film.floats("indirect.m2"),
+            indirect_m2: film.floats(INDIRECT_M2),
+            blur: film.floats(BLUR),
             samples_of_all: samples_of_all(aovs),
             of_one_sample: film.channels.iter().any(|c| c.name.starts_with("RelativeVariance.")),
             notes,
@@ -63,6 +65,7 @@ impl<'a> Layers<'a> {
             variance: has(Aov::Variance),
             indirect_variance: self.indirect_m2.is_some(),
             sharp_direct: self.aovs.film.metadata.get(SHARP_DIRECT).is_none_or(|said| said != "false"),
+            blur: self.blur.is_some(),
             indirect_stride: self.indirect_stride(),
         }
     }
@@ -94,6 +97,7 @@ impl<'a> Layers<'a> {
             stats: filled(gpu, "stats", pixels, |i| self.stats(i))?,
             light: filled(gpu, "light", if holds.light { pixels } else { 1 }, |i| self.light(i))?,
             guide: filled(gpu, "guide", pixels, |i| self.guide(i))?,
+            blur: filled(gpu, "blur of the lens", self.blur.map_or(1, <[f32]>::len), |i| self.blur(i))?,
             holds,
         })
     }
@@ -119,6 +123,11 @@ impl<'a> Layers<'a> {
             albedo: self.albedo(i),
             ..Default::default()
         }
+    }
+
+    /// How far a lens blurs what the pixel shows.
+    pub fn blur(&self, i: usize) -> f32 {
+        self.blur.map_or(0.0, |blur| blur[i])
     }
 
     /// The surface, zero where nothing is known.

@@ -17,6 +17,7 @@ pub const ROW: Row = Row {
     name: "atrous",
     about: "edge-avoiding À-Trous wavelets, steered by radiance, normal and position",
     bytes: super::pack::BYTES + 16,
+    weighs_noise: false,
     make: |gpu, s, size| Ok(Box::new(Atrous::new(gpu, &s.edge, &s.atrous, s.footprint.levels, size)?)),
     reference: |input, s| reference(input, &s.edge, &s.atrous, s.footprint.levels),
 };

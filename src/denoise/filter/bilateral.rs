@@ -14,6 +14,7 @@ pub const ROW: Row = Row {
     name: "bilateral",
     about: "exact bilateral filter, joint with normal and position",
     bytes: super::pack::BYTES + 16,
+    weighs_noise: false,
     make: |gpu, s, size| Ok(Box::new(Bilateral::new(gpu, Rates::new(&s.edge), s.footprint.radius, size)?)),
     reference: |input, s| reference(input, &Rates::new(&s.edge), s.footprint.radius),
 };

@@ -31,6 +31,16 @@ impl Method {
         matches!(self, Self::Kernels(row) if row.name == none::ROW.name)
     }
 
+    /// Whether it is given what the lens blurs, sharp light and textures, too.
+    pub(crate) fn weighs_noise(self) -> bool {
+        matches!(self, Self::Kernels(row) if row.weighs_noise)
+    }
+
+    /// Whether it filters an image but keeps away from it what the lens blurs of sharp light.
+    pub fn leaves_noise_of_lens(self) -> bool {
+        matches!(self, Self::Kernels(row) if !row.weighs_noise) && !self.is_none()
+    }
+
     /// One line of help.
     pub fn about(self) -> &'static str {
         match self {

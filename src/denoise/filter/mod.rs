@@ -57,6 +57,8 @@ pub struct Row {
     pub about: &'static str,
     /// Bytes of device memory a pixel that its own buffers take, beside the [`Planes`].
     pub(crate) bytes: u64,
+    /// Whether it changes light by no more than its noise. Others would spread sunlight and sky beyond what the lens blurs of them.
+    pub(crate) weighs_noise: bool,
     /// On a device: see [`Row::compile`].
     pub(crate) make: Make,
     /// The same on the host, in plain Rust.

@@ -9,6 +9,7 @@ pub const ROW: Row = Row {
     name: "none",
     about: "the image as it is; unusable pixels become 0",
     bytes: super::pack::BYTES,
+    weighs_noise: false,
     make: |gpu, _, size| Ok(Box::new(None(Pack::new(gpu, size)?))),
     reference: |input, _| Packed::reference(input).iter().map(Packed::output).collect(),
 };

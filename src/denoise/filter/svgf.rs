@@ -19,6 +19,7 @@ pub const ROW: Row = Row {
     name: "svgf",
     about: "À-Trous wavelets whose radiance weight counts in each pixel's standard deviations",
     bytes: super::pack::BYTES + 32, // estimate and scratch
+    weighs_noise: true,
     make: |gpu, s, size| Ok(Box::new(Svgf::new(gpu, &s.edge, &s.svgf, s.footprint.levels, size)?)),
     reference: |input, s| reference(input, &s.edge, &s.svgf, s.footprint.levels),
 };

@@ -25,6 +25,7 @@ pub const ROW: Row = Row {
     name: "wavelet",
     about: "decimated wavelets, CDF(2,2) or red-black, edge-avoiding where there are weights",
     bytes: super::pack::BYTES + 16,
+    weighs_noise: false,
     make: |gpu, s, size| {
         let steps = steps(s.footprint.levels, s.wavelet.basis);
         Ok(Box::new(Wavelet::new(gpu, Rates::new(&s.edge), steps, size)?))

@@ -47,6 +47,30 @@ fn what_mirrors_and_glass_show_is_filtered_as_it_is_and_lamps_and_sky_stay() {
     assert_eq!(row(&|i| parts.sharp[i][0]), [0.0, 0.0, 0.0, 0.0, 25.0, 50.0, 50.0, 7.0, 8.0, 9.0]);
 }
 
+/// A wall of albedo .5 that its own light, 1, and sharp light, .5, fall on: sharp, blurred by half and as a whole.
+#[test]
+fn the_share_that_a_lens_blurs_is_filtered_as_it_is() {
+    let mut film = Film::new(3, 1);
+    film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+    for (layer, value) in [("", 1.0), ("direct", 0.5), ("indirect", 1.0), ("albedo", 0.5), ("variance", 0.0009)] {
+        film.add_vec3(layer, RGB, &[[value; 3]; 3]);
+    }
+    // Of 2 samples: half of the sum of squares is the variance of their mean. Light of luminance .5 has a deviation of .02.
+    film.add("samples", Samples::U32(vec![2; 3]));
+    film.add("indirect.m2", Samples::F32(vec![0.0008; 3]));
+    film.add("denoising blur", Samples::F32(vec![0.0, 0.5, 1.0]));
+    let parts = take_apart(&film, Demodulation::Light);
+    assert_eq!(parts.factor, [[0.5; 3], [0.75; 3], [1.0; 3]]);
+    assert_eq!(parts.sharp, [[0.5; 3], [0.25; 3], [0.0; 3]]);
+    assert_eq!(parts.input.radiance, [1.0, 1.0, 1.0].map(|light| [light, light, light, 2.0]));
+    let deviations = parts.input.variance.as_ref().unwrap().iter().map(|v| v[0].sqrt());
+    for (found, expected) in deviations.zip([0.02 / 0.5, (0.02 + 0.03) / 2.0 / 0.75, 0.03]) {
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    }
+    let joined = parts.remodulate(&[[1.0, 1.0, 1.0, 2.0]; 3]);
+    assert_eq!(joined, [[1.0; 3]; 3]);
+}
+
 #[test]
 fn direct_light_is_left_out_also_where_pixels_lack_it() {
     let mut film = film();

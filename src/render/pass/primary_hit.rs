@@ -8,7 +8,7 @@ use crate::shaders::primary_hit::Bind;
 /// The specialised kernel.
 pub type Guides = Kernel<Bind<'static>>;
 
-/// camera -> guide\[tile\]; where they are kept seen\[tile\], points\[tile\]
+/// camera -> guide\[tile\]; where they are kept seen\[tile\], blur\[tile\], points\[tile\]
 pub fn record(
     k: &Guides,
     rec: &mut Recorder,
@@ -23,7 +23,8 @@ pub fn record(
         let points = &part_if(tile.has_points(), &tile.points, &part)?;
         let seen = &part_if(tile.has_seen(), &tile.seen, &part)?;
         let push = PathPush { constants: *constants, first_pixel, pixels, ..PathPush::default() };
+        let blur = &part_if(tile.has_blur(), &tile.blur, &part)?;
         let (scene, frame, ray_query) = (s.bind(), s.bind_frame(), s.bind_world());
-        rec.dispatch_threads(k, Bind { scene, frame, ray_query, guides, points, seen }, &push, pixels)
+        rec.dispatch_threads(k, Bind { scene, frame, ray_query, guides, points, seen, blur }, &push, pixels)
     })
 }

@@ -28,6 +28,7 @@ pub const ROW: Row = Row {
     // The packs', three windows', what four candidates make, two estimates, two for levels of svgf, errors and smoothed ones, three
     // of what is dim or probed, leverages and their surroundings; leverages of narrow windows, surfaces of cells, expected errors.
     bytes: super::pack::BYTES + 32 + 3 * (guided::ROW.bytes - 32) + (4 + 2 + 2 + 3 + 3 + 3 + 2) * 16 + 4 + 4 + 12,
+    weighs_noise: true,
     make: |gpu, settings, size| Ok(Box::new(Auto::new(gpu, settings, size)?)),
     reference: reference::reference,
 };

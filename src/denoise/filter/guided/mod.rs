@@ -21,6 +21,7 @@ pub const ROW: Row = Row {
     name: "guided",
     about: "guided image filter: light as a local linear function of normal and depth",
     bytes: 96, // colours, channels and four planes of models; tables are of small images
+    weighs_noise: false,
     make: |gpu, s, size| {
         let (own, radius) = (&s.guided, s.footprint.radius);
         let pack = Packed::new(gpu, own.channels, s.edge.extent, size)?;
