@@ -292,6 +292,7 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime
         None => filtered.join(gpu)?,
     };
     notes.extend(clean.notes());
+    notes.extend(denoise::note_of_lost_light(aovs, &clean.colour));
     Ok((clean.colour, clean.times, notes))
 }
 

@@ -8,6 +8,7 @@ pub mod expected;
 pub mod file;
 pub mod filter;
 mod filtered;
+mod light_left;
 mod noisy;
 #[doc(hidden)]
 pub mod sparse;
@@ -19,6 +20,7 @@ pub use demodulation::Demodulation;
 pub use denoiser::Denoiser;
 pub use expected::ExpectedError;
 pub use filtered::{Clean, Colour, Filtered, Recipe, bytes_per_pixel, host_bytes};
+pub use light_left::note_of_lost_light;
 pub use noisy::{Holds, Noisy};
 pub(crate) use timed::Chain;
 pub use timed::{Timed, timed};

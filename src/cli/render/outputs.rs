@@ -88,7 +88,10 @@ pub fn unfiltered(written: &[PathBuf]) -> String {
     if written.is_empty() {
         return "interrupted: --denoise was not finished, and nothing was written".to_owned();
     }
-    format!("interrupted: the noisy image was written to {}, --denoise was not finished", names(written))
+    let how = written.iter().find(|path| image::has_layers(path));
+    let how =
+        how.map(|path| format!("; --resume {} filters it", quoted(&path.display().to_string()))).unwrap_or_default();
+    format!("interrupted: the noisy image was written to {}, --denoise was not finished{how}", names(written))
 }
 
 /// The images: a film's own, and that of its samples.

@@ -6,10 +6,11 @@ use crate::cli::checkpoint::CheckpointFile;
 use crate::cli::files::Files;
 use crate::cli::{complain, fail_on_messages, interrupt};
 use crate::denoise::filter::Method;
-use crate::denoise::{Filtered, Noisy, Recipe};
+use crate::denoise::{self, Filtered, Noisy, Recipe};
 use crate::error::Result;
 use crate::gpu::{Gpu, total_ms};
 use crate::image::Film;
+use crate::image::aov::{Aovs, Names};
 use crate::plan::Plan;
 use crate::render::{Counters, Job, Status, StopReason, film};
 use crate::report::table;
@@ -119,6 +120,9 @@ impl Taken<'_> {
         let mut clean = self.host.time("denoise", filter)?;
         clean.expected = clean.expected.filter(|_| !planned);
         self.notes = clean.notes();
+        if let Ok(aovs) = Aovs::find(&self.film, &Names::new()) {
+            self.notes.extend(denoise::note_of_lost_light(&aovs, &clean.colour));
+        }
         film::replace_colour(&mut self.film, clean.colour, method.name());
         self.status.times.extend(clean.times);
         Ok(())
