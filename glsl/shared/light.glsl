@@ -64,7 +64,8 @@ mat3 environment_rotation(uint light) { // environment_from_world
     return transpose(mat3(Light_a(lights, light), Light_b(lights, light), Light_c(lights, light)));
 }
 
-vec3 environment_lookup(vec2 uv) {
+// Radiance without its scale, and in w the density by which texels are drawn, both bilinear: columns wrap, rows clamp.
+vec4 environment_lookup(vec2 uv) {
     ivec2 size = ivec2(push.constants.environment_size);
     vec2 at = uv * vec2(size) - 0.5;
     ivec2 p = ivec2(floor(at));
@@ -73,17 +74,15 @@ vec3 environment_lookup(vec2 uv) {
     int x0 = clamp(p.x < 0 ? p.x + size.x : p.x >= size.x ? p.x - size.x : p.x, 0, size.x - 1);
     int x1 = x0 + 1 == size.x ? 0 : x0 + 1;
     int y0 = clamp(p.y, 0, size.y - 1) * size.x, y1 = clamp(p.y + 1, 0, size.y - 1) * size.x;
-    vec3 top = mix(texelFetch(environment, y0 + x0).rgb, texelFetch(environment, y0 + x1).rgb, f.x);
-    vec3 low = mix(texelFetch(environment, y1 + x0).rgb, texelFetch(environment, y1 + x1).rgb, f.x);
+    vec4 top = mix(texelFetch(environment, y0 + x0), texelFetch(environment, y0 + x1), f.x);
+    vec4 low = mix(texelFetch(environment, y1 + x0), texelFetch(environment, y1 + x1), f.x);
     return mix(top, low, f.y);
 }
 
-// Density per solid angle of a texel, given the sine of the polar angle.
-float environment_pdf(uint light, uint texel, float sine) {
+// Density per solid angle where the look-up returns `p` in w, given the sine of the polar angle.
+float environment_pdf(uint light, float p, float sine) {
     uvec2 size = push.constants.environment_size;
-    float chosen = Light_probability(lights, light);
-    float p = texelFetch(environment, int(texel)).w;
-    return chosen * p * float(size.x) * float(size.y) / (2.0 * PI * PI * max(sine, 1e-6));
+    return Light_probability(lights, light) * p * float(size.x) * float(size.y) / (2.0 * PI * PI * max(sine, 1e-6));
 }
 
 // Radiance from `direction` and the density with which light_sample would choose it (solid angle).
@@ -91,14 +90,13 @@ vec3 environment_radiance(vec3 direction, out float pdf) {
     vec3 scale = Light_value(lights, push.constants.environment);
     pdf = Light_probability(lights, push.constants.environment) * (0.25 / PI);
     if (!FX_ENVIRONMENT_MAP || push.constants.environment_size.x == 0u) return scale;
-    uvec2 size = push.constants.environment_size;
     vec3 d = environment_rotation(push.constants.environment) * direction;
     float sine = length(d.xz);
     vec2 uv = environment_uv(d, sine);
     uv.x -= floor(uv.x);
-    uvec2 texel = min(uvec2(uv * vec2(size)), size - 1u);
-    pdf = environment_pdf(push.constants.environment, texel.y * size.x + texel.x, sine);
-    return scale * environment_lookup(uv);
+    vec4 found = environment_lookup(uv);
+    pdf = environment_pdf(push.constants.environment, found.w, sine);
+    return scale * found.rgb;
 }
 
 void sample_environment(uint light, float chosen, uint word, vec2 u, inout LightSample s) {
@@ -111,13 +109,16 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
         uvec2 size = push.constants.environment_size;
         uint count = size.x * size.y;
         uint texel = alias_choose(AliasEntry_load(environment_table, alias_slot(count, word)), count, word);
-        vec2 uv = (vec2(texel % size.x, texel / size.x) + u) / vec2(size);
+        // Tents around the centres of texels add up to bilinear interpolation; what ends beyond a pole is folded back, since rows clamp.
+        vec2 at = vec2(texel % size.x, texel / size.x) + 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
+        vec2 uv = at / vec2(size);
+        uv.y = 1.0 - abs(1.0 - abs(uv.y));
         float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
         float sine = sin(theta);
         s.direction = transpose(environment_rotation(light)) * vec3(sin(phi) * sine, cos(theta), -cos(phi) * sine);
-        // The density is that of the texel drawn: a look-up by direction could round into its neighbour.
-        s.pdf = environment_pdf(light, texel, sine);
-        s.radiance *= environment_lookup(uv);
+        vec4 found = environment_lookup(uv);
+        s.pdf = environment_pdf(light, found.w, sine);
+        s.radiance *= found.rgb;
     }
     s.radiance = s.pdf > 0.0 ? s.radiance / s.pdf : vec3(0.0);
 }

@@ -120,7 +120,8 @@ pub struct Scene {
 
 /// Latitude-longitude image: row 0 is straight up (+y), column 0 begins at direction -z, columns turn towards +x. For a
 /// unit direction d in environment space `u = atan2(d.x, -d.z) / (2 pi)`, `v = acos(d.y) / pi`; texel centres lie at
-/// half-integers. The density per solid angle of texel i is `texels[i].w * width * height / (2 pi^2 sin(theta))`.
+/// half-integers. Texels are interpolated bilinearly, columns wrap and rows clamp. Directions are drawn with the density
+/// `w * width * height / (2 pi^2 sin(theta))` per solid angle, w interpolated as radiance is.
 #[derive(Clone, Debug, Default)]
 pub struct Environment {
     /// Width in texels (longitude).

@@ -2,14 +2,14 @@
 use crate::layout::*;
 use crate::math::hash::{pcg, word_of_unit};
 use crate::math::srgb::luminance;
-use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
+use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_tent, warp_triangle};
 use crate::scene::{Environment, Scene};
 use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
 use crate::twins::light_tree::{Choice, choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
-use glam::{Mat3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles, vec2, vec3};
+use glam::{Mat3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles, Vec4, Vec4Swizzles, vec2, vec3};
 use std::f32::consts::PI;
 
 /// One light, seen from a surface point.
@@ -52,24 +52,21 @@ fn environment_rotation(light: &Light) -> Mat3 {
     Mat3::from_cols(light.a.into(), light.b.into(), light.c.into())
 }
 
-fn environment_lookup(e: &Environment, uv: Vec2) -> Vec3 {
+/// Radiance without its scale, and in w the density by which texels are drawn, both bilinear.
+fn environment_lookup(e: &Environment, uv: Vec2) -> Vec4 {
     let (width, height) = (e.width as i32, e.height as i32);
     let at = uv * vec2(width as f32, height as f32) - 0.5;
     let p = at.floor().as_ivec2();
     let f = at - p.as_vec2();
     let x0 = p.x.rem_euclid(width);
     let x1 = if x0 + 1 == width { 0 } else { x0 + 1 };
-    let texel = |x: i32, y: i32| {
-        let [r, g, b, _] = e.texels[(y.clamp(0, height - 1) * width + x) as usize];
-        vec3(r, g, b)
-    };
+    let texel = |x: i32, y: i32| Vec4::from(e.texels[(y.clamp(0, height - 1) * width + x) as usize]);
     let top = texel(x0, p.y).lerp(texel(x1, p.y), f.x);
     let low = texel(x0, p.y + 1).lerp(texel(x1, p.y + 1), f.x);
     top.lerp(low, f.y)
 }
 
-fn environment_pdf(e: &Environment, light: &Light, texel: u32, sine: f32) -> f32 {
-    let p = e.texels[texel as usize][3];
+fn environment_pdf(e: &Environment, light: &Light, p: f32, sine: f32) -> f32 {
     light.probability * p * e.width as f32 * e.height as f32 / (2.0 * PI * PI * sine.max(1e-6))
 }
 
@@ -81,9 +78,8 @@ pub fn environment_radiance(scene: &Scene, light: &Light, direction: Vec3) -> (V
     let sine = d.xz().length();
     let mut uv = environment_uv(d, sine);
     uv.x -= uv.x.floor();
-    let x = ((uv.x * e.width as f32) as u32).min(e.width - 1);
-    let y = ((uv.y * e.height as f32) as u32).min(e.height - 1);
-    (scale * environment_lookup(e, uv), environment_pdf(e, light, y * e.width + x, sine))
+    let found = environment_lookup(e, uv);
+    (scale * found.xyz(), environment_pdf(e, light, found.w, sine))
 }
 
 fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> LightSample {
@@ -91,13 +87,16 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
         None => (warp_sphere(u), light.value.into(), light.probability * (0.25 / PI)),
         Some(e) => {
             let (texel, _) = alias_choose(&e.table, word);
-            let corner = vec2((texel % e.width) as f32, (texel / e.width) as f32);
-            let uv = (corner + u) / vec2(e.width as f32, e.height as f32);
+            let centre = vec2((texel % e.width) as f32, (texel / e.width) as f32) + 0.5;
+            let at = centre + vec2(warp_tent(u.x), warp_tent(u.y));
+            let mut uv = at / vec2(e.width as f32, e.height as f32);
+            uv.y = 1.0 - (1.0 - uv.y.abs()).abs();
             let (phi, theta) = (2.0 * PI * uv.x, PI * uv.y);
             let sine = theta.sin();
             let d = vec3(phi.sin() * sine, theta.cos(), -phi.cos() * sine);
-            let radiance = Vec3::from(light.value) * environment_lookup(e, uv);
-            (environment_rotation(light) * d, radiance, environment_pdf(e, light, texel, sine))
+            let found = environment_lookup(e, uv);
+            let radiance = Vec3::from(light.value) * found.xyz();
+            (environment_rotation(light) * d, radiance, environment_pdf(e, light, found.w, sine))
         }
     };
     let radiance = if pdf > 0.0 { radiance / pdf } else { Vec3::ZERO };
