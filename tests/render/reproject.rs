@@ -529,12 +529,14 @@ fn the_unit_of_light_does_not_matter() {
 
 /// A camera that moves past a floor of rough metal, in which a lamp is seen: its highlight is where the view puts it, and leaves nothing
 /// behind on the floor.
+/// A faint sun beside the sky lets light samples choose the lamp but seldom, so that few bright samples make the highlight.
 #[test]
 fn highlights_do_not_smear() {
     let gpu = gpu();
     let mut scene = Workplace::new().scene(
         "[camera]\nposition = [-0.8, 1.2, 4.0]\ntarget = [-0.8, 0.2, 0.0]\nfov = 45.0\n[render]\nmax_depth = 2\n\
-         [environment]\nradiance = 0.2\n[[material]]\nname = 'metal'\ntype = 'conductor'\nmetal = 'Al'\nalpha = 0.15\n\
+         [environment]\nradiance = 0.2\n[[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.0]\nirradiance = 0.001\n\
+         [[material]]\nname = 'metal'\ntype = 'conductor'\nmetal = 'Al'\nalpha = 0.15\n\
          [[material]]\nname = 'lamp'\nemission = 20.0\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'metal'\n\
          transform = { rotate = [-90.0, 0.0, 0.0], scale = 9.0 }\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\ntransform = { scale = 0.4, translate = [0.0, 1.5, -3.0] }\n",
