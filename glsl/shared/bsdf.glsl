@@ -239,6 +239,18 @@ bool bsdf_is_specular(Bsdf b) {
     return is_interface(b) || is_kind(FX_COATED, b, BSDF_COATED) || is_kind(FX_METALLIC, b, BSDF_METALLIC);
 }
 
+// The lobe of rough microfacets around the mirror image of `wo`: x is the probability that bsdf_sample takes it, y its roughness, the
+// greater of two. A clear coat's lobe does not count.
+vec2 bsdf_gloss(Bsdf b, vec3 wo) {
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC))
+        return vec2(smooth_alpha(b.metallic.alpha) ? 0.0 : metallic_odds(b.metallic, wo).y, b.metallic.alpha);
+    float share = 0.0;
+    if (is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR)) share = 1.0;
+    if (is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC)) share = fresnel_dielectric(abs(wo.z), relative_index(b, wo.z)).x;
+    if (is_kind(FX_COATED, b, BSDF_COATED)) share = coat_probability(b, b.coat_outside);
+    return vec2(is_smooth(b) ? 0.0 : share, b.alpha * max(b.stretch, 1.0));
+}
+
 // Whether every lobe is a delta: light samples cannot contribute, and what is behind the surface is seen in it.
 bool bsdf_is_delta(Bsdf b) {
     return is_kind(FX_METALLIC, b, BSDF_METALLIC) ? metallic_is_delta(b.metallic) : is_interface(b) && is_smooth(b);

@@ -24,6 +24,9 @@ struct Receiver {
     vec3 normal;     // of the lobes, on the viewer's side
     bool lets_light_through;
     float odds_beyond_cosine; // added to the cosine in the odds of a light, for lobes that reflect more than the cosine says
+    vec3 viewer;              // unit, towards it
+    float gloss;              // by which the lobe around the mirror image of the viewer counts beside the cosine; 0 without that lobe
+    float alpha2;             // squared roughness of that lobe, above 0
 };
 
 // A light without extent that is chosen less often brings the noise of that choice: a filter takes it with what is soft. A sun that is
@@ -240,6 +243,18 @@ bool is_triangle_light(uint kind) { return kind == LIGHT_TRIANGLE || kind == LIG
 
 bool is_sphere_light(uint kind) { return FX_SPHERES && kind == LIGHT_SPHERE; }
 
+// What the odds of lights along `w` get for the lobe around the mirror image of the viewer. Its microfacets are GGX, whatever those of the
+// surface. Those of lights that fill a cone around `w` are rougher by `spread`, half of 1 - cosine of half its angle: as the half
+// vector turns by half of what a direction does, that keeps what all of the lobe reflects, if the cone is narrow.
+float odds_of_lobe(Receiver r, vec3 w, float spread) {
+    vec3 h = r.viewer + w;
+    float along = dot(r.normal, h), alpha2 = r.alpha2 + spread;
+    vec3 across = h - along * r.normal;
+    float across2 = dot(across, across), along2 = along > 0.0 ? along * along : 0.0, wide = across2 + alpha2 * along2;
+    float shape = (across2 + along2) / max(wide, 1e-30);
+    return r.gloss * alpha2 * shape * shape;
+}
+
 // What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
 float unshadowed(Light light, Receiver r) {
     vec3 to_light = light.a - r.position;
@@ -248,7 +263,9 @@ float unshadowed(Light light, Receiver r) {
     float cosine = dot(r.normal, w);
     if (r.lets_light_through) cosine = abs(cosine);
     if (FX_SPOT && light.kind == LIGHT_SPOT) emits = spot_share(light, w);
-    float brings = min(emits * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2, MAX_ODDS);
+    float reflects = cosine + r.odds_beyond_cosine;
+    if (FX_ROUGH) reflects += odds_of_lobe(r, w, 0.0);
+    float brings = min(emits * reflects * luminance(light.value) / d2, MAX_ODDS);
     return cosine > 0.0 || r.lets_light_through ? brings : 0.0;
 }
 

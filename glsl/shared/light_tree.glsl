@@ -47,7 +47,9 @@ float brought_by(LightNode node, Receiver r) {
         Light light = Light_load(lights, node.child & ~LIGHT_LEAF);
         if (light.kind == LIGHT_SPOT) emits *= spot_share(light, w);
     }
-    float brings = max(emits * (arrives + r.odds_beyond_cosine), LEAST_COSINES) * node.power;
+    float reflects = arrives + r.odds_beyond_cosine;
+    if (FX_ROUGH) reflects += odds_of_lobe(r, w, 0.5 - 0.5 * seen);
+    float brings = max(emits * reflects, LEAST_COSINES) * node.power;
     return faced && lit ? min(brings / max(max(centre2, 0.25 * node.radius * node.radius), 1e-30), MAX_ODDS) : 0.0;
 }
 

@@ -16,6 +16,8 @@ const float SHADOW_END = 0.99999;
 
 const float ODDS_BEYOND_COSINE = 0.05; // see Receiver: for lobes that reflect much at grazing angles
 
+const float LEAST_REST = 0.01; // share of what lobes reflect that the odds of lights take to go by the cosine, at least
+
 const float MAX_SURVIVAL = 0.95; // largest survival probability of roulette
 
 // Weight of the strategy that was used, by the balance heuristic. Two densities of 0 give 0, not 0 / 0.
@@ -36,13 +38,27 @@ vec3 light_from_hit(Path path, Surface s, float t) {
     return FX_EMISSIVE && shines ? surface_emission(s) * weight : vec3(0.0);
 }
 
+// By the probability of the lobe around the mirror image it is weighed against the others, as if these were diffuse: f cosine of the one is
+// its share D / (4 area), of the others theirs cosine / pi.
+Receiver receiver_of(Surface s, Bsdf bsdf, View view) {
+    float beyond_cosine = is_kind(FX_DIFFUSE, bsdf, BSDF_DIFFUSE) ? 0.0 : ODDS_BEYOND_COSINE;
+    Receiver r = Receiver(s.position, view.facing.normal, bsdf_lets_light_through(bsdf), beyond_cosine, UP, 0.0, 1.0);
+    if (FX_ROUGH) {
+        vec2 lobe = bsdf_gloss(bsdf, view.wo);
+        float cosine = abs(view.wo.z);
+        r.viewer = view.basis * view.wo;
+        r.alpha2 = max(lobe.y * lobe.y, 1e-6);
+        float area = 0.5 * (cosine + sqrt(mix(r.alpha2, 1.0, cosine * cosine)));
+        r.gloss = lobe.x / (4.0 * area * max(1.0 - lobe.x, LEAST_REST));
+    }
+    return r;
+}
+
 // Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed.
 vec3 light_from_nee(Surface s, Bsdf bsdf, View view, Sampler random, uint pair, uint mask_seed,
                     out Segment shadow, out bool sharp) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
-    float beyond_cosine = is_kind(FX_DIFFUSE, bsdf, BSDF_DIFFUSE) ? 0.0 : ODDS_BEYOND_COSINE;
-    Receiver receiver = Receiver(s.position, view.facing.normal, bsdf_lets_light_through(bsdf), beyond_cosine);
-    LightSample light = light_sample(receiver, word, sample_2d(random, pair + PAIR_LIGHT));
+    LightSample light = light_sample(receiver_of(s, bsdf, view), word, sample_2d(random, pair + PAIR_LIGHT));
     sharp = light.sharp;
     vec3 wi = light.direction * view.basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, view.wo, wi);

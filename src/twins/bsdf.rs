@@ -316,6 +316,20 @@ pub fn bsdf_is_specular(b: &Bsdf) -> bool {
     matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC | BSDF_COATED | BSDF_METALLIC)
 }
 
+/// The lobe of rough microfacets around the mirror image of `wo`: the probability that [`bsdf_sample`] takes it, and its roughness, the
+/// greater of two. A clear coat's lobe does not count.
+pub fn bsdf_gloss(b: &Bsdf, wo: Vec3) -> (f32, f32) {
+    let share = match b.kind {
+        _ if is_smooth(b) => 0.0,
+        BSDF_CONDUCTOR => 1.0,
+        BSDF_DIELECTRIC => fresnel_dielectric(wo.z.abs(), relative_index(b, wo.z)).x,
+        BSDF_COATED => coat_probability(b, coat_outside(b, wo.z)),
+        BSDF_METALLIC => b.metallic.odds(wo).y,
+        _ => 0.0,
+    };
+    (share, b.alpha * b.stretch.max(1.0))
+}
+
 /// Whether every lobe is a delta.
 pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     match b.kind {

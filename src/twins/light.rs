@@ -220,7 +220,8 @@ fn unshadowed(light: &Light, r: &Receiver) -> f32 {
     let cosine = r.normal.dot(w);
     let cosine = if r.lets_light_through { cosine.abs() } else { cosine };
     let emits = if light.kind == LIGHT_SPOT { spot_share(light, w) } else { 1.0 };
-    let brings = (emits * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2).min(MAX_ODDS);
+    let reflects = cosine + r.odds_beyond_cosine + r.odds_of_lobe(w, 0.0);
+    let brings = (emits * reflects * luminance(light.value) / d2).min(MAX_ODDS);
     if cosine > 0.0 || r.lets_light_through { brings } else { 0.0 }
 }
 

@@ -19,12 +19,36 @@ pub struct Receiver {
     pub lets_light_through: bool,
     /// Added to the cosine in the odds of a light, for lobes that reflect more than the cosine says.
     pub odds_beyond_cosine: f32,
+    /// Unit vector towards the viewer.
+    pub viewer: Vec3,
+    /// By which the lobe around the mirror image of the viewer counts beside the cosine; 0 without that lobe.
+    pub gloss: f32,
+    /// Squared roughness of that lobe, above 0.
+    pub alpha2: f32,
 }
 
 impl Receiver {
     /// A point that light from everywhere reaches alike.
     pub fn point(position: Vec3) -> Self {
-        Self { position, normal: Vec3::ZERO, lets_light_through: true, odds_beyond_cosine: 1.0 }
+        Self {
+            position,
+            normal: Vec3::ZERO,
+            lets_light_through: true,
+            odds_beyond_cosine: 1.0,
+            viewer: Vec3::Z,
+            gloss: 0.0,
+            alpha2: 1.0,
+        }
+    }
+
+    /// What the odds of lights along `w` get for the lobe around the mirror image of the viewer, where they fill a cone around `w`: `spread`
+    /// is half of 1 - cosine of half its angle.
+    pub fn odds_of_lobe(&self, w: Vec3, spread: f32) -> f32 {
+        let (h, alpha2) = (self.viewer + w, self.alpha2 + spread);
+        let along = self.normal.dot(h);
+        let (across2, along2) = ((h - along * self.normal).length_squared(), along.max(0.0).powi(2));
+        let shape = (across2 + along2) / (across2 + alpha2 * along2).max(1e-30);
+        self.gloss * alpha2 * shape * shape
     }
 }
 
@@ -65,7 +89,8 @@ pub fn brought_by(scene: &Scene, node: &LightNode, r: &Receiver) -> f32 {
     let emits = if both_sides { 0.5 * (front + mean_cosine(-beam, m, 1.0)) } else { front };
     let leaf = (node.child & LIGHT_LEAF != 0).then(|| &scene.lights[(node.child & !LIGHT_LEAF) as usize]);
     let emits = leaf.filter(|light| light.kind == LIGHT_SPOT).map_or(emits, |light| emits * spot_share(light, w));
-    let brings = (emits * (arrives + r.odds_beyond_cosine)).max(LEAST_COSINES) * node.power;
+    let reflects = arrives + r.odds_beyond_cosine + r.odds_of_lobe(w, 0.5 - 0.5 * seen);
+    let brings = (emits * reflects).max(LEAST_COSINES) * node.power;
     let d2 = centre2.max(0.25 * node.radius * node.radius).max(1e-30);
     if faced && lit { (brings / d2).min(MAX_ODDS) } else { 0.0 }
 }

@@ -157,7 +157,7 @@ impl Metallic {
     }
 
     /// Probabilities of the coat's lobe, the specular, the diffuse one, and that through a thin wall.
-    fn odds(&self, wo: Vec3) -> Vec4 {
+    pub fn odds(&self, wo: Vec3) -> Vec4 {
         let (c, mean) = (wo.z, |v: Vec3| v.element_sum() / 3.0);
         let inner = self.coat_lets_in(wo.dot(self.coat_normal));
         let base = inner * self.let_in(c);

@@ -5,11 +5,12 @@ use crate::layout::{
 use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::shaders::shared::path_step::{
-    MAX_SURVIVAL, ODDS_BEYOND_COSINE, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE,
+    LEAST_REST, MAX_SURVIVAL, ODDS_BEYOND_COSINE, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE,
     PAIRS_PER_BOUNCE,
 };
 use crate::twins::bsdf::{
-    Bsdf, bsdf_albedo, bsdf_chooses, bsdf_evaluate, bsdf_is_delta, bsdf_lets_light_through, bsdf_sample, relative_index,
+    Bsdf, bsdf_albedo, bsdf_chooses, bsdf_evaluate, bsdf_gloss, bsdf_is_delta, bsdf_lets_light_through, bsdf_sample,
+    relative_index,
 };
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
@@ -133,6 +134,22 @@ struct Shade {
     from: [u32; 2],
 }
 
+/// What light is sampled for at a surface point.
+pub fn receiver_of(s: &Surface, bsdf: &Bsdf, view: &View) -> Receiver {
+    let (share, alpha) = bsdf_gloss(bsdf, view.wo);
+    let (cosine2, alpha2) = (view.wo.z * view.wo.z, (alpha * alpha).max(1e-6));
+    let area = 0.5 * (view.wo.z.abs() + (alpha2 + (1.0 - alpha2) * cosine2).sqrt());
+    Receiver {
+        position: s.position,
+        normal: view.facing.normal,
+        lets_light_through: bsdf_lets_light_through(bsdf),
+        odds_beyond_cosine: if bsdf.kind == BSDF_DIFFUSE { 0.0 } else { ODDS_BEYOND_COSINE },
+        viewer: view.basis * view.wo,
+        gloss: share / (4.0 * area * (1.0 - share).max(LEAST_REST)),
+        alpha2,
+    }
+}
+
 impl Tracer<'_> {
     fn balance(&self, taken: f32, other: f32, strategy: Strategy) -> f32 {
         match self.strategy {
@@ -180,13 +197,8 @@ impl Tracer<'_> {
     fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<(Vec3, bool)> {
         let s = &p.surface;
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
-        let receiver = Receiver {
-            position: s.position,
-            normal: p.view.facing.normal,
-            lets_light_through: bsdf_lets_light_through(&p.bsdf),
-            odds_beyond_cosine: if p.bsdf.kind == BSDF_DIFFUSE { 0.0 } else { ODDS_BEYOND_COSINE },
-        };
-        let light = light_sample(self.scene, &receiver, word, sample_2d(random, p.pair + PAIR_LIGHT));
+        let light =
+            light_sample(self.scene, &receiver_of(s, &p.bsdf, &p.view), word, sample_2d(random, p.pair + PAIR_LIGHT));
         if light.radiance == Vec3::ZERO {
             return None;
         }

@@ -1,5 +1,6 @@
 //! Tests on the CPU twins that random choices follow the densities that the code claims.
 mod bsdf;
+mod gloss;
 mod light;
 mod metallic;
 mod sampler;
