@@ -27,10 +27,14 @@ pub enum Error {
     /// A scene whose arrays were edited and no longer fit together.
     #[error("the scene's arrays do not fit together: {0}: edit all that an index leads to, or load the scene again")]
     Scene(String),
-    /// No Vulkan loader, no usable device, a missing feature, or the device is out of memory.
+    /// No Vulkan loader, no usable device, a missing feature, or more than the device's limits let it do. Where a function names this
+    /// error, the device may also be lost or out of memory.
     #[error("{0}")]
     Device(String),
-    /// What is asked for takes more memory than the host has free.
+    /// The device is out of memory: what was asked for is not there, and what was made before is as it was.
+    #[error("{0}")]
+    OutOfDeviceMemory(String),
+    /// What is asked for takes more memory than the host has free, or the driver found no more of it.
     #[error("{0}")]
     Memory(String),
     /// The device was lost: nothing made on it works any more, and a new one must be opened.
@@ -67,7 +71,7 @@ impl Error {
         match self {
             Self::Usage(_) => 2,
             Self::Input { .. } | Self::Scene(_) => 3,
-            Self::Device(_) | Self::DeviceLost(_) | Self::Memory(_) => 4,
+            Self::Device(_) | Self::OutOfDeviceMemory(_) | Self::DeviceLost(_) | Self::Memory(_) => 4,
             Self::Output { .. } => 5,
         }
     }

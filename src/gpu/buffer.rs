@@ -1,11 +1,11 @@
 //! Typed, named buffers in device memory: allocation, binding, and element access from the host.
-use super::{At, DeviceKind, Gpu};
+use super::{At, DeviceKind, Gpu, LESS_MEMORY, explain};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
 use bytemuck::Pod;
-use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::{AllocationError, MemoryLocation};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -40,6 +40,7 @@ pub struct RawBuffer {
 
 /// How the values of one pixel are laid out in memory. `as i32` gives the `VkFormat` of the same name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 #[repr(i32)]
 pub enum PixelFormat {
     /// One unsigned 32-bit integer.
@@ -306,14 +307,13 @@ impl Untyped {
         // From here on, Drop cleans up if a line below fails.
         let (name, gpu) = (name.to_owned(), gpu.clone());
         let buffer = Self { gpu, name, raw, size, shown, location, stride, texel, memory, views };
-        let remedy = "choose a smaller film or scene, or a device with more memory";
-        buffer.allocate(location).map_err(|e| Error::Device(format!("{what}: {e}: {remedy}")))?;
+        buffer.allocate(location, &what)?;
         let no_more = vk::MemoryPropertyFlags::empty();
         buffer.mapped(no_more, |bytes| bytes[size as usize..shown as usize].fill(0));
         Ok(buffer)
     }
 
-    fn allocate(&self, location: Location) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    fn allocate(&self, location: Location, what: &str) -> Result<()> {
         let device = &self.gpu.0.device;
         // SAFETY: a live buffer of this device.
         let requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
@@ -325,17 +325,22 @@ impl Untyped {
             Location::Readback => MemoryLocation::GpuToCpu,
         };
         let mut allocator = self.gpu.0.lock_allocator();
-        let memory = allocator.as_mut().ok_or("the device is closing")?.allocate(&AllocationCreateDesc {
+        let closing = || Error::Device(format!("{what}: the device is closing"));
+        let allocated = allocator.as_mut().ok_or_else(closing)?.allocate(&AllocationCreateDesc {
             name: &self.name,
             requirements,
             location,
             linear: true,
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+        });
+        let memory = allocated.map_err(|error| match error {
+            AllocationError::OutOfMemory => explain(what, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY),
+            other => Error::Device(format!("{what}: {other}: {LESS_MEMORY}")),
         })?;
         // SAFETY: fresh memory that fits the requirements, kept until the buffer is destroyed.
         let bound = unsafe { device.bind_buffer_memory(self.raw, memory.memory(), memory.offset()) };
         *self.memory.lock().unwrap_or_else(PoisonError::into_inner) = Some(memory);
-        Ok(bound?)
+        bound.at(what)
     }
 
     /// Calls `access` with the mapped bytes. Returns `None` if the memory is not mapped, not coherent, or lacks a property in

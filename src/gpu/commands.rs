@@ -30,7 +30,7 @@ impl Commands {
     /// Begins a new recording and discards the one before.
     ///
     /// # Errors
-    /// The device is out of memory, or was abandoned.
+    /// The device is out of memory, or was lost before.
     pub fn begin(&self) -> Result<()> {
         self.gpu.0.answers()?;
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);

@@ -66,6 +66,8 @@ pub(super) struct Inner {
     running: RwLock<()>,
     /// Limit of [`Self::wait`] in nanoseconds.
     wait_limit: u64,
+    /// Whether the device was lost: nothing more is asked of it.
+    lost: AtomicBool,
     /// Whether work was left running that may never end. Nothing is freed any more then, because that work may use it.
     abandoned: AtomicBool,
     /// `None` only during construction and destruction.
@@ -133,6 +135,7 @@ impl Gpu {
             queue: Mutex::new(queue),
             running: RwLock::new(()),
             wait_limit: limit.as_nanos().try_into().unwrap_or(u64::MAX),
+            lost: AtomicBool::new(false),
             abandoned: AtomicBool::new(false),
             allocator: Mutex::new(None),
             device,
@@ -227,11 +230,12 @@ impl Inner {
         let submit = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
         let _running = self.running.read().unwrap_or_else(PoisonError::into_inner);
         // SAFETY: the buffer is complete, the fence unsignalled, and the lock keeps the queue to this thread.
-        unsafe {
-            self.device.reset_fences(&[fence])?;
-            self.device.queue_submit2(*self.lock_queue(), &submit, fence)?;
-        }
-        self.wait(fence, progress).inspect_err(|failure| self.settle(*failure))
+        let submitted = unsafe {
+            let reset = self.device.reset_fences(&[fence]);
+            reset.and_then(|()| self.device.queue_submit2(*self.lock_queue(), &submit, fence))
+        };
+        let done = submitted.and_then(|()| self.wait(fence, progress).inspect_err(|failure| self.settle(*failure)));
+        done.inspect_err(|failure| self.note_loss(*failure))
     }
 
     fn wait(&self, fence: vk::Fence, progress: impl Fn() -> usize) -> std::result::Result<(), vk::Result> {
@@ -272,18 +276,27 @@ impl Inner {
         self.running.write().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Remembers a failure that says that the device is lost, or that it is given up as lost.
+    pub fn note_loss(&self, failure: vk::Result) {
+        self.lost.fetch_or(matches!(failure, vk::Result::ERROR_DEVICE_LOST | vk::Result::TIMEOUT), Ordering::SeqCst);
+    }
+
     /// # Errors
-    /// [`Error::DeviceLost`] when work was left behind on the device that may run for ever.
+    /// [`Error::DeviceLost`] once a loss was noted.
     pub fn answers(&self) -> Result<()> {
-        match self.abandoned.load(Ordering::SeqCst) {
+        match self.lost.load(Ordering::SeqCst) {
             false => Ok(()),
-            true => Err(Error::DeviceLost("the device stopped answering before: open another".into())),
+            true => Err(Error::DeviceLost("the device was lost, or stopped answering, before: open another".into())),
         }
+    }
+
+    fn is_abandoned(&self) -> bool {
+        self.abandoned.load(Ordering::SeqCst)
     }
 
     /// Calls `destroy`, unless abandoned work may still use what it destroys.
     pub fn free(&self, destroy: impl FnOnce(&ash::Device)) {
-        if self.answers().is_ok() {
+        if !self.is_abandoned() {
             destroy(&self.device);
         }
     }
@@ -300,7 +313,7 @@ impl Inner {
 
 impl Drop for Inner {
     fn drop(&mut self) {
-        if self.answers().is_err() {
+        if self.is_abandoned() {
             // Its work may still be running, so the allocator, the loader and the driver are leaked.
             std::mem::forget(self.lock_allocator().take());
             return;

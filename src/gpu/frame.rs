@@ -48,7 +48,8 @@ impl FrameResources {
     /// Begin and end of each pass of the last recording, in order; empty if the queue has no timestamps.
     ///
     /// # Errors
-    /// When that work is not complete.
+    /// [`Error::Device`](crate::error::Error::Device) when that work is not complete,
+    /// [`Error::DeviceLost`](crate::error::Error::DeviceLost) when the device was lost: nothing on it works from then on.
     pub fn times(&self) -> Result<Vec<PassTime>> {
         self.timer.times()
     }
@@ -56,7 +57,7 @@ impl FrameResources {
     /// The passes of the last recording, in order, with what they were recorded with; empty if they were not timed.
     ///
     /// # Errors
-    /// When that work is not complete.
+    /// As [`Self::times`].
     pub fn passes(&self) -> Result<Vec<Pass>> {
         let shapes = self.shapes.iter().cloned();
         Ok(self.times()?.into_iter().zip(shapes).map(|(time, shape)| Pass { time, shape }).collect())
@@ -99,7 +100,7 @@ impl FrameResources {
     /// `Recorder::external` requires it.
     ///
     /// # Errors
-    /// The device was abandoned, with the work on it.
+    /// The device was lost before.
     pub(super) fn reset(&mut self) -> Result<()> {
         self.gpu().0.answers()?;
         self.timer.reset();

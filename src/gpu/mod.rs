@@ -88,14 +88,17 @@ fn explain(what: &str, code: vk::Result) -> Error {
              again with a smaller film, and update its driver if it happens again"
         ));
     }
-    Error::Device(match code {
-        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
-            format!("{what}: out of memory: choose a smaller film or scene, or a device with more memory")
-        }
+    let out_of_memory = format!("{what}: out of memory: {LESS_MEMORY}");
+    match code {
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => Error::OutOfDeviceMemory(out_of_memory),
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY => Error::Memory(out_of_memory),
         vk::Result::ERROR_INITIALIZATION_FAILED => {
             let or = or_out_of_addresses();
-            format!("{what}: the driver failed to start: check that it matches the running system{or}")
+            Error::Device(format!("{what}: the driver failed to start: check that it matches the running system{or}"))
         }
-        other => format!("{what}: Vulkan returned {other:?}"),
-    })
+        other => Error::Device(format!("{what}: Vulkan returned {other:?}")),
+    }
 }
+
+/// What to do where memory is not enough.
+const LESS_MEMORY: &str = "choose a smaller film or scene, or a device with more memory";

@@ -1,5 +1,5 @@
 //! Begin and end of each pass, measured with the device's timestamps.
-use super::{At, Gpu};
+use super::{At, Gpu, explain};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::OnceLock;
@@ -173,11 +173,17 @@ impl Timer {
     }
 
     /// # Errors
-    /// When the work is not complete.
+    /// When the work is not complete, or the device was lost.
     pub fn times(&self) -> Result<Vec<PassTime>> {
         let clock = Clock::of(&self.gpu);
-        let ticks = self.ticks().ok_or_else(|| {
-            Error::Device("the times of a frame were asked for before its work was complete: wait for it".into())
+        let ticks = self.ticks().map_err(|code| match code {
+            vk::Result::NOT_READY => {
+                Error::Device("the times of a frame were asked for before its work was complete: wait for it".into())
+            }
+            code => {
+                self.gpu.0.note_loss(code);
+                explain("the times of a frame", code)
+            }
         })?;
         let Some(&[first, _]) = ticks.first() else { return Ok(Vec::new()) };
         Ok(self.passes.iter().zip(&ticks).map(|(name, ticks)| clock.pass(name, first, *ticks)).collect())
@@ -185,30 +191,36 @@ impl Timer {
 
     /// The last pass that began, for a message about a lost device. Most drivers still return the queries then.
     pub fn last_started(&self) -> Option<&'static str> {
-        let started = |index: &usize| matches!(self.query(2 * index), Some([_, available]) if available != 0);
+        let started = |index: &usize| matches!(self.query(2 * index), Ok([_, available]) if available != 0);
         (0..self.passes.len()).rev().find(started).map(|index| self.passes[index])
     }
 
     /// Number of timestamps written so far. It grows as the work proceeds.
     pub fn written(&self) -> usize {
-        let there = |index: &usize| matches!(self.query(*index), Some([_, available]) if available != 0);
+        let there = |index: &usize| matches!(self.query(*index), Ok([_, available]) if available != 0);
         (0..2 * self.passes.len()).filter(there).count()
     }
 
-    /// Begin and end of every pass in ticks; `None` when one is not available yet.
-    fn ticks(&self) -> Option<Vec<[u64; 2]>> {
-        let read = |index| self.query(index).filter(|[_, available]| *available != 0).map(|[ticks, _]| ticks);
-        (0..self.passes.len()).map(|pass| Some([read(2 * pass)?, read(2 * pass + 1)?])).collect()
+    /// Begin and end of every pass in ticks.
+    ///
+    /// # Errors
+    /// `NOT_READY` when one is not available yet, and those of Vulkan.
+    fn ticks(&self) -> std::result::Result<Vec<[u64; 2]>, vk::Result> {
+        let read = |index| match self.query(index)? {
+            [_, 0] => Err(vk::Result::NOT_READY),
+            [ticks, _] => Ok(ticks),
+        };
+        (0..self.passes.len()).map(|pass| Ok([read(2 * pass)?, read(2 * pass + 1)?])).collect()
     }
 
     /// (ticks, availability) of one query; availability is 0 until the timestamp is written.
-    fn query(&self, index: usize) -> Option<[u64; 2]> {
+    fn query(&self, index: usize) -> std::result::Result<[u64; 2], vk::Result> {
         let (pool, query) = (self.pools[index / POOL as usize], (index % POOL as usize) as u32);
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
         let mut result = [[0u64; 2]];
         // SAFETY: a live pool; the result has two words per query, as the flags say.
-        let asked = unsafe { self.gpu.0.device.get_query_pool_results(pool, query, &mut result, flags) };
-        asked.ok().map(|()| result[0])
+        unsafe { self.gpu.0.device.get_query_pool_results(pool, query, &mut result, flags) }?;
+        Ok(result[0])
     }
 }
 

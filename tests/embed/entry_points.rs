@@ -52,7 +52,8 @@ fn nothing_is_created_after_the_first_frame() {
             denoiser.record(&mut rec).unwrap();
         });
         assert!(frame.times().is_ok());
-        let calls = hooks::take_calls();
+        let mut calls = hooks::take_calls();
+        calls.remove("vkGetQueryPoolResults"); // asks, and makes nothing
         assert!(number == 0 || calls.is_empty(), "frame {number}: {calls:?}");
     }
     // The engine's window changes its size: the renderer's kernels stay, even though nothing holds them meanwhile.
@@ -79,7 +80,30 @@ fn a_lost_device_is_one_line_and_exit_code_4() {
     assert!(matches!(error, Error::DeviceLost(_)) && error.exit_code() == 4);
     let line = error.to_string();
     assert!(line.contains("the device was lost") && line.contains("run again") && !line.contains('\n'), "{line}");
-    assert!(renderer.run(&mut frame, &Step::Start).is_ok(), "control: nothing fails without the hook");
+    for refused in [renderer.run(&mut frame, &Step::Start).map(drop), renderer.picture().map(drop)] {
+        assert!(matches!(refused, Err(Error::DeviceLost(_))), "{refused:?}");
+    }
+    drop((renderer, frame, gpu));
+    assert!(hooks::take_calls().contains_key("vkFreeMemory"), "what is lost is freed all the same");
+}
+
+/// An engine that waited for its own submission asks for the times of it.
+#[test]
+fn times_of_a_lost_device_say_so_and_nothing_is_read_from_it_then() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let scene = scene();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    renderer.run(&mut frame, &Step::Start).unwrap();
+    assert!(frame.times().is_ok() && renderer.picture().is_ok(), "control: nothing fails without the hook");
+    hooks::LOSE.store(true, SeqCst);
+    let lost = [frame.times().map(drop), frame.passes().map(drop)];
+    hooks::LOSE.store(false, SeqCst);
+    for refused in lost.into_iter().chain([renderer.picture().map(drop)]) {
+        assert!(matches!(refused, Err(Error::DeviceLost(_))), "{refused:?}");
+    }
 }
 
 /// Out of memory says nothing of the work that was submitted: it is over before anything of it is freed.
@@ -92,13 +116,18 @@ fn a_wait_that_fails_leaves_nothing_in_flight() {
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     hooks::take_calls();
-    hooks::WAIT.store(vk::Result::ERROR_OUT_OF_HOST_MEMORY.as_raw(), SeqCst);
-    let failed = renderer.run(&mut frame, &Step::Start).map(drop);
-    hooks::WAIT.store(0, SeqCst);
-    let calls = hooks::take_calls();
-    assert_eq!((calls["vkWaitForFences"], calls.get("vkQueueWaitIdle")), (1, Some(&1)), "{calls:?}");
-    let error = failed.unwrap_err();
-    assert!(matches!(error, Error::Device(_)) && error.to_string().contains("out of memory"), "{error}");
+    let mut fail = |code: vk::Result| {
+        hooks::WAIT.store(code.as_raw(), SeqCst);
+        let failed = renderer.run(&mut frame, &Step::Start).map(drop);
+        hooks::WAIT.store(0, SeqCst);
+        let calls = hooks::take_calls();
+        assert_eq!((calls["vkWaitForFences"], calls.get("vkQueueWaitIdle")), (1, Some(&1)), "{calls:?}");
+        let error = failed.unwrap_err();
+        assert!(error.exit_code() == 4 && error.to_string().contains("out of memory"), "{error}");
+        error
+    };
+    assert!(matches!(fail(vk::Result::ERROR_OUT_OF_HOST_MEMORY), Error::Memory(_)));
+    assert!(matches!(fail(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY), Error::OutOfDeviceMemory(_)));
     assert!(renderer.run(&mut frame, &Step::Start).is_ok(), "the device is as good as before");
     assert_eq!(hooks::take_calls().get("vkQueueWaitIdle"), None, "control: only after a failure");
     drop((renderer, frame, gpu));

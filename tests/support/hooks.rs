@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicI32, Ordering::SeqCst};
 use std::sync::{LazyLock, Mutex};
 use tallow::gpu::RawDevice;
 
-/// While set, whatever is submitted loses the device.
+/// While set, the device is lost to whatever is submitted, and to whoever asks for times.
 pub static LOSE: AtomicBool = AtomicBool::new(false);
 
 /// While it is not 0, what every wait for a fence returns, without waiting.
@@ -43,7 +43,8 @@ fn failure(name: &str) -> Option<vk::Result> {
         let code = WAIT.load(SeqCst);
         return (code != 0).then(|| vk::Result::from_raw(code));
     }
-    (LOSE.load(SeqCst) && name.starts_with("vkQueueSubmit")).then_some(vk::Result::ERROR_DEVICE_LOST)
+    let fails = name.starts_with("vkQueueSubmit") || name == "vkGetQueryPoolResults";
+    (LOSE.load(SeqCst) && fails).then_some(vk::Result::ERROR_DEVICE_LOST)
 }
 
 /// A function of the loader or the driver; another one for every engine, since both may be unloaded between two.
@@ -145,5 +146,6 @@ between! {
     vkDestroyCommandPool: PFN_vkDestroyCommandPool(d: vk::Device, p: vk::CommandPool, a: Alloc<'_>) -> ();
     vkDestroyDescriptorPool: PFN_vkDestroyDescriptorPool(d: vk::Device, p: vk::DescriptorPool, a: Alloc<'_>) -> ();
     vkDestroyQueryPool: PFN_vkDestroyQueryPool(d: vk::Device, p: vk::QueryPool, a: Alloc<'_>) -> ();
+    vkGetQueryPoolResults: PFN_vkGetQueryPoolResults(d: vk::Device, p: vk::QueryPool, first: u32, n: u32, size: usize, to: *mut c_void, stride: vk::DeviceSize, f: vk::QueryResultFlags) -> vk::Result;
     vkResetCommandPool: PFN_vkResetCommandPool(d: vk::Device, p: vk::CommandPool, f: vk::CommandPoolResetFlags) -> vk::Result;
 }
