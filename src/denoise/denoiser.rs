@@ -20,9 +20,9 @@ impl Denoiser {
     /// Compiles a row of [`FILTERS`](crate::denoise::filter::FILTERS) for the films of `renderer`, which was made with
     /// [`Outputs::guides`](crate::render::Outputs::guides), and for [`Demodulation::Light`] with
     /// [`Outputs::split_light`](crate::render::Outputs::split_light). Distances in the settings
-    /// are in units of `extent`: give the diagonal of [`Scene::bounds`](crate::scene::Scene::bounds), or of what is seen;
-    /// `sigma_rt` is in units of `intensity`: give the radiance of what is white in your frames. [`Filtered`](super::Filtered)
-    /// finds both by itself, but waits for the device.
+    /// are in units of `extent`: [`FilterSettings::for_scene`] takes the diagonal of the scene's bounds; where little of a large scene is
+    /// seen, give that of what is. `sigma_rt` is in units of `intensity`: give the radiance of what is white in your frames.
+    /// [`Filtered`](super::Filtered) finds both by itself, but waits for the device.
     ///
     /// Where the renderer's policy may leave pixels without a sample, these take direct light from the others, which the filter
     /// runs for once more.

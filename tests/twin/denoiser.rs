@@ -14,7 +14,7 @@ use tallow::image::aov::{Aovs, Names};
 use tallow::image::{Film, Samples};
 use tallow::layout::{Guide, NONE, PixelLight, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
-use tallow::render::{Outputs, Renderer};
+use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::Scene;
 use tallow::statistics::{Pixel, variance_of_mean};
 
@@ -430,6 +430,21 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
     let foreign = Denoiser::new(&other, &renderer, find("atrous").unwrap(), &right, Demodulation::Light);
     has(foreign.err().map(|e| e.to_string()), "the renderer was made on another device");
     assert_silent(&gpu);
+}
+
+#[test]
+fn settings_for_a_scene_are_near_those_that_its_image_tells() {
+    let gpu = gpu();
+    let renderer = renderer(&gpu, [33, 17], Outputs::FILTERED, "uniform");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
+    let settings = FilterSettings::for_scene(&Scene::load(&file).unwrap());
+    let denoiser = Denoiser::new(&gpu, &renderer, find("svgf").unwrap(), &settings, Demodulation::Albedo).unwrap();
+    Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
+    gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
+    let told = settings.scaled_by(&denoiser.scales().unwrap());
+    let ratio = settings.edge.extent / told.edge.extent;
+    assert!((0.8..1.25).contains(&ratio), "{} of {}", settings.edge.extent, told.edge.extent);
+    assert_eq!(FilterSettings::for_scene(&Scene::default()), FilterSettings::default(), "no surface, no size");
 }
 
 #[test]

@@ -12,12 +12,12 @@ settings! {
     pub struct EdgeSettings {
         /// What is given of them.
         EdgeOverrides {
-            /// Scale of radiance [default: the image's largest]
+            /// Scale of radiance: what is white [default: the image's largest]
             intensity: f32 = 1.0, FINITE_ABOVE_0;
             /// Radiance that is usual: auto takes errors as relative down to a tenth of it [default: the square of the mean root of
             /// the image's luminance]
             usual: f32 = 0.01, FINITE_ABOVE_0;
-            /// Scale of distances in world units [default: the diagonal of what is seen]
+            /// Scale of distances: the size of what is seen in world units [default: the diagonal of what is seen]
             extent: f32 = 1.0, FINITE_ABOVE_0;
             /// Radiance difference that counts as an edge, in units of --intensity; inf switches it off.
             sigma_rt: f32 = 1.0, FROM_0;

@@ -8,7 +8,9 @@ use super::svgf::{SvgfOverrides, SvgfSettings};
 use super::wavelet::{WaveletOverrides, WaveletSettings};
 use super::{FilterInput, Scales};
 use crate::error::Result;
+use crate::scene::Scene;
 use crate::settings::{entry, settings};
+use glam::Vec3;
 
 settings! {
     /// The settings of all filters.
@@ -32,6 +34,13 @@ impl FilterSettings {
     /// [`crate::error::Error::Usage`] with the parameter, its value and its range.
     pub fn validate(&self) -> Result<()> {
         entry::check(&self.entries())
+    }
+
+    /// The defaults for frames of this scene: `extent` is the diagonal of its bounds, and stays 1 where it has no surface.
+    pub fn for_scene(scene: &Scene) -> Self {
+        let [low, high] = scene.bounds.map(Vec3::from);
+        let diagonal = (high - low).length();
+        Self::default().with(|s| s.edge.extent = if diagonal > 0.0 { diagonal } else { s.edge.extent })
     }
 
     /// These settings, changed.
