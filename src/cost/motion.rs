@@ -95,7 +95,7 @@ impl<'a> Moving<'a> {
     pub fn effects(&mut self, settings: &Settings, outputs: Outputs) -> Result<(Effects, Change)> {
         let (mut effects, mut all) = (called_for(&self.scene, settings, outputs), Change::default());
         for frame in self.frames(true) {
-            all.add(self.pose(frame)?);
+            all.add(self.pose(frame)?)?;
             effects = effects.or(called_for(&self.scene, settings, outputs));
         }
         Ok((effects, all))

@@ -102,7 +102,7 @@ impl<'a> Session<'a> {
             None => called_for(self.scene, settings, *outputs),
             Some(moving) => {
                 let (effects, change) = moving.effects(settings, *outputs)?;
-                tell(&mut self.warm, &change);
+                tell(&mut self.warm, &change)?;
                 effects
             }
         };
@@ -130,7 +130,7 @@ impl<'a> Session<'a> {
     fn forget(&mut self, shot: usize) -> Result<()> {
         self.warm[shot] = None;
         let Some(moving) = &mut self.moving else { return Ok(()) };
-        tell(&mut self.warm, &moving.rest()?);
+        tell(&mut self.warm, &moving.rest()?)?;
         Ok(())
     }
 
@@ -147,7 +147,7 @@ impl<'a> Session<'a> {
         let frames = moving.frames(carries);
         let mut last = None;
         for number in frames.clone() {
-            tell(warm, &moving.pose(number)?);
+            tell(warm, &moving.pose(number)?)?;
             let Some(Warm { renderer, missed, .. }) = &mut warm[shot] else { return Ok(None) };
             // Frames that begin with others' samples need random numbers of their own.
             renderer.set_seed(if carries { seed.wrapping_add(number) } else { seed });
@@ -236,8 +236,11 @@ pub fn add_filter(run: &mut Run, render: &WarmUp, filtered: &Timed) -> WarmUp {
 }
 
 /// Tells all renderers that the scene has changed.
-fn tell(warm: &mut [Option<Warm>], change: &Change) {
-    warm.iter_mut().flatten().for_each(|warm| warm.missed.add(change.clone()));
+///
+/// # Errors
+/// Those of [`Change::add`].
+fn tell(warm: &mut [Option<Warm>], change: &Change) -> Result<()> {
+    warm.iter_mut().flatten().try_for_each(|warm| warm.missed.add(change.clone()))
 }
 
 /// Runs a whole render, and returns its wall time. `None` if it was stopped.

@@ -4,7 +4,7 @@ use crate::allocate::HostInputs;
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceInfo, FrameResources, Gpu, PassTime, Recorder, milliseconds};
 use crate::image::Picture;
-use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush, uvec2, vec4};
+use crate::layout::{Apportionment, Camera, Effect, Effects, PixelStats, PriorityPush, uvec2, vec4};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::frame::{self, Frame};
 use crate::render::kernels::{Allocation, Kernels};
@@ -250,15 +250,15 @@ impl Renderer {
     ///
     /// # Errors
     /// [`crate::error::Error::Usage`] for a number that is not finite, and for a lens when the scene was loaded with a pinhole: the
-    /// kernels have no lens then. Ask [`Renderer::specialised`] for the effect `lens`, or load the scene with one. Likewise for parallel rays and the effect
-    /// `orthographic`.
+    /// kernels have no lens then. Make it by [`Renderer::specialised`] with the effect `lens`, or load the scene with one. Likewise for
+    /// parallel rays and the effect `orthographic`.
     pub fn set_camera(&mut self, camera: Camera) -> Result<()> {
         scene::check_camera(&camera)?;
         if camera.lens_radius > 0.0 && !self.effects.lens {
-            return Err(Error::Usage("this renderer was made without the effect \"lens\"".into()));
+            return Err(lacks_effect(Effect::lens));
         }
         if camera.orthographic != 0 && !self.effects.orthographic {
-            return Err(Error::Usage("this renderer was made without the effect \"orthographic\"".into()));
+            return Err(lacks_effect(Effect::orthographic));
         }
         self.frame.constants.camera = camera;
         self.fingerprint = None;
@@ -336,6 +336,15 @@ impl Renderer {
         let pair = |i: usize| u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32;
         Ok(Counters { closest: pair(0), any: pair(1), nodes: pair(2) })
     }
+}
+
+/// For what a renderer has no kernels for.
+pub(super) fn lacks_effect(effect: Effect) -> Error {
+    Error::Usage(format!(
+        "this renderer was made without the effect \"{}\": make it by Renderer::specialised, with what render::called_for \
+         finds in the scene as it will be",
+        effect.name()
+    ))
 }
 
 /// The effects that a scene, its settings and the outputs call for.

@@ -2,7 +2,7 @@
 use super::buffers::DeviceScene;
 use super::frame;
 use super::push::{frame_constants, priority_push};
-use super::renderer::{Renderer, called_for};
+use super::renderer::{Renderer, called_for, lacks_effect};
 use super::upload::{parts, whole};
 use crate::error::{Error, Result};
 use crate::gpu::Recorder;
@@ -94,11 +94,7 @@ impl Renderer {
         let lacks = |(_, (calls, has)): &(&Effect, (bool, bool))| *calls && !has;
         let both = called.switches().into_iter().zip(self.effects.switches());
         match Effect::ALL.iter().zip(both).find(lacks) {
-            Some((effect, _)) => Err(Error::Usage(format!(
-                "this renderer was made without the effect \"{}\", which the scene calls for now: ask \
-                 Renderer::specialised for it",
-                effect.name()
-            ))),
+            Some((&effect, _)) => Err(lacks_effect(effect)),
             None => Ok(()),
         }
     }

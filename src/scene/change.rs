@@ -1,5 +1,6 @@
 //! What a pose has changed in a scene's arrays.
 use super::Scene;
+use crate::error::{Error, Result};
 use crate::layout::Light;
 use std::ops::Range;
 
@@ -68,15 +69,18 @@ impl Change {
         arrays && !(*everything || *instances || *materials || *lights) // without these, no numbers are new
     }
 
-    /// Adds what a later pose has changed.
-    pub fn add(&mut self, later: Self) {
+    /// Adds what a later pose has changed in the same scene.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a change of fewer things than this one's, which is left as it is.
+    pub fn add(&mut self, later: Self) -> Result<()> {
+        let instance_now = number(&self.instance_now, later.instance_now)?;
+        (self.instance_now, self.triangle_now) = (instance_now, number(&self.triangle_now, later.triangle_now)?);
         self.everything |= later.everything;
         self.camera |= later.camera;
         self.nodes.extend(later.nodes);
         self.triangles.extend(later.triangles);
         self.instances |= later.instances;
-        number(&mut self.instance_now, later.instance_now);
-        number(&mut self.triangle_now, later.triangle_now);
         self.materials |= later.materials;
         self.texels.extend(later.texels);
         if !self.lights {
@@ -84,15 +88,17 @@ impl Change {
         }
         self.lights |= later.lights;
         self.deformed.extend(later.deformed);
+        Ok(())
     }
 }
 
-/// Follows a change of numbers by a later one.
-fn number(now: &mut Vec<u32>, later: Vec<u32>) {
+/// A change of numbers, followed by a later one.
+fn number(now: &[u32], later: Vec<u32>) -> Result<Vec<u32>> {
+    let other = || Error::Usage("a change of another scene was added: add changes of one scene, in their order".into());
     match (now.is_empty(), later.is_empty()) {
-        (true, _) => *now = later,
-        (false, true) => {}
-        (false, false) => now.iter_mut().for_each(|index| *index = later[*index as usize]),
+        (true, _) => Ok(later),
+        (false, true) => Ok(now.to_vec()),
+        (false, false) => now.iter().map(|&i| later.get(i as usize).copied().ok_or_else(other)).collect(),
     }
 }
 
@@ -117,11 +123,13 @@ mod tests {
         assert!(numbers(&b, &b).is_empty());
         let change = |from: &[u32], to: &[u32]| Change { instance_now: numbers(from, to), ..Change::default() };
         let mut all = change(&a, &b);
-        all.add(change(&b, &b));
-        all.add(change(&b, &c));
+        all.add(change(&b, &b)).unwrap();
+        all.add(change(&b, &c)).unwrap();
         assert_eq!(all.instance_now, numbers(&a, &c));
         let mut still = Change::default();
-        still.add(change(&b, &c));
+        still.add(change(&b, &c)).unwrap();
         assert_eq!(still.instance_now, numbers(&b, &c));
+        let of_another = all.add(change(&[0, 1], &[1, 0])).unwrap_err();
+        assert!(of_another.exit_code() == 2 && all.instance_now == numbers(&a, &c), "{of_another}");
     }
 }

@@ -112,7 +112,7 @@ pub struct Scene {
     pub bounds: Bounds,
     /// What can move: see [`Scene::apply`].
     pub rig: Rig,
-    /// Names of objects and materials by index, for `tallow explain` and reports.
+    /// Names of objects and materials by index.
     pub names: Names,
     /// Readable lines about what was repaired on loading.
     pub warnings: Vec<String>,
@@ -134,13 +134,20 @@ pub struct Environment {
     pub table: Vec<AliasEntry>,
 }
 
-/// Names of a scene's parts, for reports.
+/// Names of a scene's parts.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
     /// Names of the objects, by index.
     pub objects: Vec<String>,
     /// Names of the materials, by index.
     pub materials: Vec<String>,
+}
+
+impl Names {
+    /// Index in [`Scene::materials`] of the material of this name, the first if there are several.
+    pub fn material(&self, name: &str) -> Option<usize> {
+        self.materials.iter().position(|material| material == name)
+    }
 }
 
 /// A scene, and the settings that its file gives.

@@ -5,7 +5,7 @@ use super::description::{Camera, LightTable, Transform};
 pub const REBUILD_ABOVE: f32 = 1.4;
 
 /// A change of a scene between two frames. What it does not name stays as it is. [`Rig`](super::Rig) finds the numbers of
-/// things by their names.
+/// things by their names, [`Names::material`](super::Names::material) those of materials.
 #[derive(Clone, Debug)]
 pub struct Pose {
     /// The `[camera]` table anew.

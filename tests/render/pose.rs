@@ -70,10 +70,15 @@ fn an_effect_that_was_not_compiled_is_named() {
     let change = scene.apply(&Pose { materials: vec![(0, fade)], ..Pose::default() }).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let error = gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change)).unwrap_err();
-    assert!(error.to_string().contains("\"alpha_masks\"") && error.exit_code() == 2, "{error}");
+    assert!(
+        error.to_string().contains("\"alpha_masks\"")
+            && error.to_string().contains("called_for")
+            && error.exit_code() == 2,
+        "{error}"
+    );
     let solid = MaterialChange { opacity: Some(1.0), ..MaterialChange::default() };
     let mut back = change.clone();
-    back.add(scene.apply(&Pose { materials: vec![(0, solid)], ..Pose::default() }).unwrap());
+    back.add(scene.apply(&Pose { materials: vec![(0, solid)], ..Pose::default() }).unwrap()).unwrap();
     gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &back)).unwrap();
     assert!(render(&gpu, &renderer) == fresh(&gpu, &at(&Moment::default())));
     let change = scene.apply(&Pose { materials: vec![(0, fade)], ..Pose::default() }).unwrap();

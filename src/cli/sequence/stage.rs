@@ -219,8 +219,7 @@ impl<'a> Stage<'a> {
         let change = self.scene.apply(&pose)?;
         report.refit_cost = change.deformed.iter().map(|d| d.cost).reduce(f32::max);
         report.rebuilt = change.deformed.iter().filter(|d| d.rebuilt).count();
-        self.change.add(change);
-        Ok(())
+        self.change.add(change)
     }
 
     /// Tells the renderer of what has changed, or makes one with the effects that this frame calls for too.
