@@ -33,11 +33,11 @@ fn room() -> Loaded {
 
 fn moved(scene: &Scene, name: &str, x: f64, y: f64, z: f64) -> Pose {
     let place = scene.rig.placement(name).unwrap();
-    let at = Transform::from([1., 0., 0., x, 0., 1., 0., y, 0., 0., 1., z, 0., 0., 0., 1.]);
+    let at = Transform::try_from([1., 0., 0., x, 0., 1., 0., y, 0., 0., 1., z, 0., 0., 0., 1.]).unwrap();
     let was = match name {
-        "board" => Transform::from([1.2, 0., 0., 0., 0., 0.1, 0., 0., 0., 0., 1.2, 0., 0., 0., 0., 1.]),
-        "panel" => Transform::from([0.5, 0., 0., 0., 0., 0., -0.5, 0., 0., 0.5, 0., 0., 0., 0., 0., 1.]),
-        _ => Transform::from([0.25, 0., 0., 0., 0., 0.25, 0., 0., 0., 0., 0.25, 0., 0., 0., 0., 1.]),
+        "board" => Transform::try_from([1.2, 0., 0., 0., 0., 0.1, 0., 0., 0., 0., 1.2, 0., 0., 0., 0., 1.]).unwrap(),
+        "panel" => Transform::try_from([0.5, 0., 0., 0., 0., 0., -0.5, 0., 0., 0.5, 0., 0., 0., 0., 0., 1.]).unwrap(),
+        _ => Transform::try_from([0.25, 0., 0., 0., 0., 0.25, 0., 0., 0., 0., 0.25, 0., 0., 0., 0., 1.]).unwrap(),
     };
     Pose { instances: vec![(place, Transform(at.0 * was.0))], ..Pose::default() }
 }

@@ -37,7 +37,8 @@ fn card_at(scene: &Loaded, frame: u32) -> Pose {
     let (t, place) = (f64::from(frame), scene.rig.placement("card").unwrap());
     let (sin, cos) = (0.03 * t).sin_cos();
     let x = 0.11 * t - 0.5;
-    let to = Transform::from([cos, -sin, 0., x, sin, cos, 0., 0.05 * t, 0., 0., 1., 0.1 * t, 0., 0., 0., 1.]);
+    let to =
+        Transform::try_from([cos, -sin, 0., x, sin, cos, 0., 0.05 * t, 0., 0., 1., 0.1 * t, 0., 0., 0., 1.]).unwrap();
     Pose { instances: vec![(place, to)], ..Pose::default() }
 }
 

@@ -100,7 +100,7 @@ fn described() -> Description {
     };
     let instance = |x: f64| InstanceTable {
         mesh: "lamp".to_owned(),
-        transform: [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0].into(),
+        transform: [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0].try_into().unwrap(),
         ..InstanceTable::default()
     };
     let checks = Some(TextureTable::from("pictures/checks"));

@@ -2,7 +2,7 @@
 //! cannot be.
 use crate::poses::{MOMENTS, Moment, at, pose};
 use bytemuck::{Pod, cast_slice};
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use std::path::Path;
 use tallow::layout::{Instance, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT};
 use tallow::scene::description::Transform;
@@ -98,7 +98,7 @@ fn a_tree_over_lamps_follows_them() {
     };
     let mut scene = at(0.0, 3.0);
     assert!(scene.has_light_tree() && scene.light_nodes.len() > scene.lights.len());
-    let to = |x: f64| Transform::from([1., 0., 0., x, 0., 1., 0., 2., 0., 0., 1., 0., 0., 0., 0., 1.]);
+    let to = |x: f64| Transform::try_from([1., 0., 0., x, 0., 1., 0., 2., 0., 0., 1., 0., 0., 0., 0., 1.]).unwrap();
     scene.apply(&Pose { instances: vec![(0, to(4.0))], ..Pose::default() }).unwrap();
     assert_eq!(scene.light_nodes, at(4.0, 3.0).light_nodes);
     assert_ne!(scene.light_nodes, at(0.0, 3.0).light_nodes, "control");
@@ -177,7 +177,7 @@ fn sun_and_sky_shine_where_all_is_hidden() {
         let mut rows = [0.0; 16];
         [0, 5, 10].iter().for_each(|&i| rows[i] = scale);
         rows[15] = 1.0;
-        Pose { instances: vec![(0, Transform::from(rows))], ..Pose::default() }
+        Pose { instances: vec![(0, Transform::try_from(rows).unwrap())], ..Pose::default() }
     };
     for scale in [0.0, 1.0, 0.0] {
         scene.apply(&sized(scale)).unwrap();
@@ -239,13 +239,13 @@ fn what_is_hidden_comes_back() {
     let whole = scene.clone();
     let lights = scene.lights.len();
     scene.large_lamps = true; // the panel is none
-    let gone = Transform::from([0.0; 16]);
+    let gone = Transform(DAffine3::ZERO);
     let hide = Pose { instances: (0..3).map(|i| (i, gone)).collect(), ..Pose::default() };
     scene.apply(&hide).unwrap();
     scene.check().unwrap();
     assert_eq!(scene.lights.len(), lights - 2, "the panel's two triangles shine no more");
     assert!(scene.large_lamps, "lamps are sampled as the compiled kernels do, whatever is in view");
-    let tiny = Transform::from([1e-14, 0., 0., 0., 0., 1e-14, 0., 0., 0., 0., 1e-14, 0., 0., 0., 0., 1.]);
+    let tiny = Transform::try_from([1e-14, 0., 0., 0., 0., 1e-14, 0., 0., 0., 0., 1e-14, 0., 0., 0., 0., 1.]).unwrap();
     scene.apply(&Pose { instances: vec![(0, tiny)], ..Pose::default() }).unwrap();
     scene.apply(&pose(&scene, &Moment::default(), 1.4)).unwrap();
     assert_eq!(differing(&scene, &whole), none());
@@ -264,7 +264,7 @@ fn beside(cube: &str, edge: f64) -> Scene {
 /// The second cube this far away.
 fn away(x: f64) -> Pose {
     let rows = [1., 0., 0., x, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
-    Pose { instances: vec![(1, Transform::from(rows))], ..Pose::default() }
+    Pose { instances: vec![(1, Transform::try_from(rows).unwrap())], ..Pose::default() }
 }
 
 /// Such a pose hides what it makes too small to see, and no later one does.
@@ -297,7 +297,7 @@ fn what_is_large_and_out_of_reach_is_refused_as_by_the_loader() {
 fn poses_that_cannot_be_are_one_line_and_change_nothing() {
     let mut scene = at(&Moment::default()).scene;
     let (before, mesh) = (arrays(&scene), scene.rig.mesh("cloth").unwrap());
-    let place = |number, rows| Pose { instances: vec![(number, Transform::from(rows))], ..Pose::default() };
+    let place = |number, at| Pose { instances: vec![(number, Transform(at))], ..Pose::default() };
     let deform = |mesh, positions: Vec<[f32; 3]>, normals| Pose {
         meshes: vec![(mesh, Vertices { positions, normals, ..Vertices::default() })],
         ..Pose::default()
@@ -309,8 +309,8 @@ fn poses_that_cannot_be_are_one_line_and_change_nothing() {
     let mut far = still.clone();
     far[3][0] = 2e12;
     let cases = [
-        (place(0, [f64::NAN; 16]), "instance 0 gets a transform with NaN"),
-        (place(9, [1.0; 16]), "instance 9 of 4"),
+        (place(0, DAffine3::NAN), "instance 0 gets a transform with NaN"),
+        (place(9, DAffine3::IDENTITY), "instance 9 of 4"),
         (deform(mesh, still[..9].to_vec(), Vec::new()), "has 576 vertices, not 9"),
         (deform(mesh, still.clone(), vec![[0.0; 3]; 5]), "576 positions but 5 normals"),
         (deform(mesh, broken, Vec::new()), "a vertex with a NaN"),
@@ -359,7 +359,7 @@ fn a_scene_whose_centre_comes_to_lie_on_its_camera_is_refused() {
     let before = arrays(&scene);
     let at = |z: f64| {
         let rows = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., z, 0., 0., 0., 1.];
-        Pose { instances: vec![(0, Transform::from(rows))], ..Pose::default() }
+        Pose { instances: vec![(0, Transform::try_from(rows).unwrap())], ..Pose::default() }
     };
     let error = scene.apply(&at(5.0)).unwrap_err();
     let said = error.to_string();

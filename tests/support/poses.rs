@@ -52,7 +52,7 @@ fn cloth(wave: f32) -> Mesh {
 fn steps(moment: &Moment) -> [Transform; 3] {
     let (sin, cos) = (moment.turn * std::f64::consts::TAU).sin_cos();
     let at = |x: f64, y: f64, z: f64, scale: f64| {
-        Transform::from([scale * cos, 0., sin, x, 0., 1., 0., y, -scale * sin, 0., cos, z, 0., 0., 0., 1.])
+        Transform::try_from([scale * cos, 0., sin, x, 0., 1., 0., y, -scale * sin, 0., cos, z, 0., 0., 0., 1.]).unwrap()
     };
     [at(cos, 0.8, sin, 1.0), at(-1.3 * cos, 1.2, 1.3 * sin, moment.scale), at(0.3 * sin, 2.4, 0.0, 1.0)]
 }
@@ -77,8 +77,8 @@ pub fn at(moment: &Moment) -> Loaded {
         material: Some(material.into()),
         ..MeshTable::default()
     };
-    let wide = Transform::from([5., 0., 0., 0., 0., 0., 5., -0.5, 0., -5., 0., 0., 0., 0., 0., 1.]);
-    let panel = Transform::from([0.5, 0., 0., 0., 0., 0., -0.5, 0., 0., 0.5, 0., 0., 0., 0., 0., 1.]);
+    let wide = Transform::try_from([5., 0., 0., 0., 0., 0., 5., -0.5, 0., -5., 0., 0., 0., 0., 0., 1.]).unwrap();
+    let panel = Transform::try_from([0.5, 0., 0., 0., 0., 0., -0.5, 0., 0., 0.5, 0., 0., 0., 0., 0., 1.]).unwrap();
     let material = |name: &str, color: f32, emission: f32| MaterialTable {
         name: name.into(),
         color: Some(Rgb([color, 0.5, 0.3])),

@@ -111,7 +111,7 @@ fn materials() -> Vec<MaterialTable> {
 
 fn place(translate: [f64; 3], sign: f64) -> Transform {
     let [x, y, z] = translate;
-    [sign, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0].into()
+    [sign, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0].try_into().unwrap()
 }
 
 /// A patch of each material, one of them placed twice, once mirrored.

@@ -503,7 +503,7 @@ fn mirrored_lamps_shine_as_rays_find_them() {
             // A pose that mirrors the lamp once more, and one that mirrors it again.
             for width in [1.0, -1.0] {
                 let at = [width, 0., 0., 0., 0., 0., -1., 1.4, 0., 1., 0., 0.1, 0., 0., 0., 1.];
-                let instances = vec![(0, Transform::from(at))];
+                let instances = vec![(0, Transform::try_from(at).unwrap())];
                 scene.apply(&Pose { instances, ..Pose::default() }).unwrap();
                 let share = other_light(&scene);
                 assert!(share < 5e-3, "{share} of the samples, {material}, {width}");

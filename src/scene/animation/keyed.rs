@@ -2,7 +2,7 @@
 use super::Mover;
 use super::curve::Curve;
 use crate::error::Result;
-use crate::scene::description::{Camera, LightTable, LightType, Rgb, Transform};
+use crate::scene::description::{Camera, LightTable, LightType, Rgb, Transform, affine};
 use crate::scene::pose::{EnvironmentChange, MaterialChange, Pose};
 use glam::{DAffine3, DQuat, DVec3};
 
@@ -123,8 +123,8 @@ impl Keyed {
 
     /// Where keys put what otherwise is at `rest`.
     pub fn place(&self, rest: &DAffine3, at: f64) -> DAffine3 {
-        if let Some(rows) = self.find("transform", at).and_then(|rows| <[f64; 16]>::try_from(rows).ok()) {
-            return Transform::from(rows).0;
+        if let Some(placed) = self.find("transform", at).and_then(|rows| affine(&rows)) {
+            return placed;
         }
         let translation = self.three("translate", at).map_or(rest.translation, DVec3::from);
         let [scale, rotation] = [self.find("scale", at), self.find("rotate", at)];

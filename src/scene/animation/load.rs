@@ -8,7 +8,7 @@ use crate::scene::Scene;
 use crate::scene::description::{
     self, AnimationTable, Camera, Description, Interpolation, mesh_number, meshes_to_free, numbered, rotation,
 };
-use crate::scene::description::{Key, Transform};
+use crate::scene::description::{Key, affine};
 use glam::DAffine3;
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -103,8 +103,7 @@ fn target(table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<
     }
     if let Some(name) = &table.material {
         let all: Vec<_> = scene.names.materials.iter().map(|name| Some(name.clone())).collect();
-        let found = scene.names.materials.iter().position(|n| n == name);
-        let found = found.ok_or_else(|| unknown("material", name, all.iter()))?;
+        let found = scene.names.material(name).ok_or_else(|| unknown("material", name, all.iter()))?;
         return Ok((format!("material \"{name}\""), Target::Material(found)));
     }
     match from.environment {
@@ -166,8 +165,7 @@ fn add(
         curves.push((name, Curve::new(keys, interpolation, true)?));
         return Ok(());
     }
-    let matrix = |(_, v): &(f64, Vec<f64>)| Some(Transform::from(<[f64; 16]>::try_from(&v[..]).ok()?).0);
-    let split: Option<Vec<_>> = keys.iter().map(|key| parts(&matrix(key)?)).collect();
+    let split: Option<Vec<_>> = keys.iter().map(|(_, rows)| parts(&affine(rows)?)).collect();
     match split.filter(|_| name == "transform" && interpolation == Interpolation::Linear) {
         Some(split) => {
             let of = |value: &dyn Fn(usize) -> Vec<f64>| (0..keys.len()).map(|i| (keys[i].0, value(i))).collect();

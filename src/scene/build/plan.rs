@@ -3,7 +3,7 @@ use super::sources::{Sources, mesh_name};
 use crate::error::Result;
 use crate::layout::{MATERIAL_MASKED, NONE};
 use crate::scene::description::shape::Shape;
-use crate::scene::description::{self, Description, InstanceTable, Key, MeshTable, Numbers, Transform};
+use crate::scene::description::{self, Description, InstanceTable, Key, MeshTable, Numbers, Transform, affine};
 use crate::scene::load::material::Materials;
 use glam::{DAffine3, DMat3};
 use std::collections::HashMap;
@@ -170,7 +170,7 @@ fn is_stretched(description: &Description, job: &Job) -> bool {
     let is_uneven = |key: &Key| {
         let numbers = |name: &str| key.values.get(name).map(Numbers::list);
         let scale = numbers("scale").is_some_and(|s| s.windows(2).any(|two| two[0] != two[1]));
-        let matrix = numbers("transform").and_then(|n| Some(Transform::from(<[f64; 16]>::try_from(n).ok()?).0));
+        let matrix = numbers("transform").and_then(|rows| affine(&rows));
         scale || matrix.is_some_and(|affine| !is_even(&affine))
     };
     tables.flat_map(|t| &t.keys).any(is_uneven)

@@ -24,6 +24,7 @@ pub use material::{AlphaMode, Distribution, MaterialTable, Type as MaterialType}
 pub use mesh::{Bitmap, Mesh};
 pub use shape::Shape;
 pub use texture::{TextureFilter, TextureTable, Wrap};
+pub(in crate::scene) use value::affine;
 pub(super) use value::rotation;
 pub use value::{Rgb, Transform};
 

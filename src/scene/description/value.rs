@@ -104,11 +104,28 @@ impl Transform {
     }
 }
 
-/// Row-major, as in a scene file; the last row counts as 0 0 0 1.
-impl From<[f64; 16]> for Transform {
-    fn from(rows: [f64; 16]) -> Self {
-        Self(DAffine3::from_mat4(DMat4::from_cols_array(&rows).transpose()))
+/// Row-major, as in a scene file. The last row is 0 0 0 w, by which all is divided.
+///
+/// # Errors
+/// [`Error::Usage`](crate::error::Error::Usage) for another last row, as that of a column-major matrix.
+impl TryFrom<[f64; 16]> for Transform {
+    type Error = crate::error::Error;
+
+    fn try_from(rows: [f64; 16]) -> crate::error::Result<Self> {
+        let m = DMat4::from_cols_array(&rows).transpose();
+        match m.row(3).to_array() {
+            [0.0, 0.0, 0.0, w] if w != 0.0 => Ok(Self(DAffine3::from_mat4(m * (1.0 / w)))),
+            row => Err(crate::error::Error::Usage(format!(
+                "the last row of transform is {row:?}, not 0 0 0 1: give the matrix row by row"
+            ))),
+        }
     }
+}
+
+/// The map of 16 row-major numbers whose last row is 0 0 0 1; `None` for another count.
+pub fn affine(rows: &[f64]) -> Option<DAffine3> {
+    let rows = rows.try_into().ok()?;
+    Some(DAffine3::from_mat4(DMat4::from_cols_array(rows).transpose()))
 }
 
 impl<'de> Deserialize<'de> for Transform {
@@ -120,11 +137,7 @@ impl<'de> Deserialize<'de> for Transform {
                 f.write_str("16 numbers or a table of translate, rotate, scale")
             }
             fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Transform, A::Error> {
-                let m = DMat4::from_cols_array(&numbers::<16, A>(seq, "transform")?).transpose();
-                match m.row(3).to_array() {
-                    [0.0, 0.0, 0.0, w] if w != 0.0 => Ok(Transform(DAffine3::from_mat4(m * (1.0 / w)))),
-                    row => Err(A::Error::custom(format!("the last row of transform is {row:?}, not 0 0 0 1"))),
-                }
+                Transform::try_from(numbers::<16, A>(seq, "transform")?).map_err(A::Error::custom)
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Transform, A::Error> {
                 let steps = Steps::deserialize(value::MapAccessDeserializer::new(map))?;
@@ -168,6 +181,18 @@ mod tests {
         let error = |text: &str| toml::from_str::<Row>(text).unwrap_err().message().to_owned();
         assert!(error("t = [0, 0]").contains("16 numbers, not 2"));
         assert!(error("t = [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,1,1]").contains("last row"));
+    }
+
+    #[test]
+    fn numbers_in_memory_are_held_to_what_a_file_is() {
+        let rows = [2., 0., 0., 10., 0., 2., 0., 12., 0., 0., 2., 14., 0., 0., 0., 2.];
+        let Transform(halved) = Transform::try_from(rows).unwrap();
+        assert_eq!(halved, DAffine3::from_translation(DVec3::new(5., 6., 7.)));
+        let columns = DMat4::from_translation(DVec3::new(5., 6., 7.)).to_cols_array();
+        for wrong in [columns, [0.; 16]] {
+            let error = Transform::try_from(wrong).unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().contains("last row"), "{error}");
+        }
     }
 
     #[test]

@@ -100,7 +100,7 @@ fn rigid(number: u32) -> Pose {
     let place = |i: u32| {
         let (sin, cos) = (f64::from(number) * 0.05 + f64::from(i)).sin_cos();
         let (x, y, z) = (f64::from(i) * 2.0 - 100.0 + 3.0 * cos, 20.0 + 10.0 * sin, 8.0 * cos);
-        (i as usize, Transform::from([1.5, 0., 0., x, 0., 1.5, 0., y, 0., 0., 1.5, z, 0., 0., 0., 1.]))
+        (i as usize, Transform::try_from([1.5, 0., 0., x, 0., 1.5, 0., y, 0., 0., 1.5, z, 0., 0., 0., 1.]).unwrap())
     };
     Pose { instances: (0..100).map(place).collect(), ..Pose::default() }
 }

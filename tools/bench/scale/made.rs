@@ -115,7 +115,7 @@ fn lamps(edge: u32) -> Description {
 /// Puts a copy to place number `i` of a square grid.
 fn place(mesh: &str, i: u32, spacing: f64) -> InstanceTable {
     let [x, y] = [i % 300, i / 300].map(|v| f64::from(v) * spacing);
-    let transform = Transform::from([1., 0., 0., x, 0., 1., 0., 0., 0., 0., 1., y, 0., 0., 0., 1.]);
+    let transform = Transform::try_from([1., 0., 0., x, 0., 1., 0., 0., 0., 0., 1., y, 0., 0., 0., 1.]).unwrap();
     InstanceTable { mesh: mesh.to_owned(), transform, ..InstanceTable::default() }
 }
 
