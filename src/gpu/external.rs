@@ -15,8 +15,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// The caller's handles, as the numbers of Vulkan's C interface (pointers for dispatchable handles), and how to use the
-/// device.
-#[derive(Clone, Debug)]
+/// device. By default the handles are null, which [`Gpu::from_raw`] refuses: give all five, and `..RawDevice::default()` for what need
+/// not be told.
+#[derive(Clone, Debug, Default)]
 pub struct RawDevice {
     /// `vkGetInstanceProcAddr` of the loader that made the rest.
     pub get_instance_proc_addr: *const c_void,
@@ -39,7 +40,8 @@ pub struct RawDevice {
     /// How long to wait for a device that stands still; see [`super::DeviceOptions::wait_limit`].
     pub wait_limit: Option<Duration>,
     /// Who finds what rays meet. For [`Tracing::RayQuery`] the device was made with VK_KHR_ray_query, VK_KHR_acceleration_structure and
-    /// VK_KHR_deferred_host_operations, and with `rayQuery`, `accelerationStructure` and `bufferDeviceAddress`.
+    /// VK_KHR_deferred_host_operations, and with the features `rayQuery`, `accelerationStructure` and `bufferDeviceAddress`. Vulkan does
+    /// not tell all of that of a device: [`Gpu::from_raw`] refuses one that it sees to lack the second or the third extension.
     pub tracing: Tracing,
     /// Sizes into which work is divided; see [`super::DeviceOptions::tuning`].
     pub tuning: Option<Tuning>,
@@ -103,8 +105,9 @@ impl Gpu {
         let calibrated = CalibratedExtension::BY_PREFERENCE.into_iter().find(|extension| has(&[extension.function()]));
         let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance, &device));
         let by_ray_query = is_by_ray_query(raw.tracing, &candidate.info)?;
-        if by_ray_query && !has(&[c"vkCreateAccelerationStructureKHR"]) {
-            let what = "the device cannot trace by ray queries: enable VK_KHR_acceleration_structure when you make it";
+        if by_ray_query && !has(&[c"vkCreateAccelerationStructureKHR", c"vkCreateDeferredOperationKHR"]) {
+            let what = "the device cannot trace by ray queries: make it with VK_KHR_ray_query, VK_KHR_acceleration_structure and \
+                        VK_KHR_deferred_host_operations, and with rayQuery, accelerationStructure and bufferDeviceAddress";
             return Err(Error::Device(what.to_owned()));
         }
         let ray_queries = by_ray_query.then(|| RayQueries::new(&instance, physical, &device));

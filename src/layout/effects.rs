@@ -37,6 +37,7 @@ macro_rules! effects {
         /// One of [`Effects`]. They are named as its fields are, so that both come from one list.
         #[allow(non_camel_case_types)]
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[non_exhaustive]
         pub enum Effect { $($(#[$doc])* $field,)+ }
         impl Effect {
             /// All effects, in the order of their ids.

@@ -38,6 +38,7 @@ pub struct Job<'a> {
 /// Why a render ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum StopReason {
     /// All samples are taken.
     Done,

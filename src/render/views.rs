@@ -24,6 +24,7 @@ pub struct OutputView {
 
 /// What a renderer leaves of every pixel; the EXR layers of the same names hold these values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Layer {
     /// Mean of the samples: linear radiance (Rec. 709).
     Radiance,

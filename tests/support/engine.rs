@@ -171,10 +171,8 @@ impl Engine {
             queue_family: 0,
             robust_buffer_access: true,
             debug_utils: true,
-            cache: None,
-            wait_limit: None,
             tracing: self.tracing,
-            tuning: None,
+            ..RawDevice::default()
         }
     }
 

@@ -71,6 +71,7 @@ pub struct Choice {
 
 /// A piece of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Step {
     /// Forgets all samples; finds the primary hits, if anybody reads them.
     Start,
