@@ -25,7 +25,7 @@ pub struct Placement {
     pub number: u32,
 }
 
-/// The structures of a scene. They are built by [`Recorder::build`](super::Recorder::build), and again after a change.
+/// The structures of a scene. They are built when a renderer is made, and again after a change.
 pub struct Acceleration {
     pub(super) handles: Arc<Handles>,
     pub(super) meshes: Vec<Mesh>,

@@ -21,7 +21,7 @@ impl Carried {
         Self { count: word & 0xffff, age: (word >> 16) & 0xff, edge: word >> 24 & 1 != 0, back: word >> 25 & 1 != 0 }
     }
 
-    /// Of a pixel of [`History::carried`], where a word without samples may say why.
+    /// Of a pixel of [`History::carried`](super::History::carried), where a word without samples may say why.
     pub(super) fn of_pixel(word: u32) -> Self {
         let all = Self::of(word);
         if all.count > 0 { all } else { Self::default() }
@@ -33,7 +33,7 @@ impl Carried {
     }
 }
 
-/// How many samples of a pixel are carried, by its word in [`History::carried`].
+/// How many samples of a pixel are carried, by its word in [`History::carried`](super::History::carried).
 pub fn carried_samples(word: u32) -> u32 {
     word & MOST_CARRIED
 }

@@ -35,7 +35,7 @@ pub fn deficit(weights: &[u32], have: &[u32], total: u64) -> Vec<u32> {
 }
 
 /// Samples that pixels lack until weight / sqrt(n) reaches the threshold, both 12.20 fixed point:
-/// ceil((w / t)^2) - have, at least 1 and at most max(have, [`INITIAL_SAMPLES`]) and what is left of `enough`; 0 of a weight of 0.
+/// ceil((w / t)^2) - have, at least 1 and at most max(have, `INITIAL_SAMPLES`) and what is left of `enough`; 0 of a weight of 0.
 pub fn need(weights: &[u32], have: &[u32], threshold: u32, enough: u32) -> Vec<u32> {
     let lack = |(&w, &have): (&u32, &u32)| {
         let wanted = (u64::from(w) * u64::from(w)).div_ceil(u64::from(threshold) * u64::from(threshold));

@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 /// Render the frames of an animation
 ///
-/// Frame n shows the scene n / fps seconds after the start of its [[animation]] tables. Files have `####` for the number of the
+/// Frame n shows the scene n / fps seconds after the start of its `[[animation]]` tables. Files have `####` for the number of the
 /// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose, settings and filter is not rendered
 /// again; its other pictures are written anew. A frame that fails does not stop the others: the exit code is 6 then. A camera without
 /// position has in view what all of --frames reach.

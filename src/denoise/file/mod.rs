@@ -102,7 +102,7 @@ impl<'a> Layers<'a> {
         })
     }
 
-    /// Colour and variance with their samples: those of the pixel, or of all; [`UNTOLD`] where the file does not say; 0 where it
+    /// Colour and variance with their samples: those of the pixel, or of all; `UNTOLD` where the file does not say; 0 where it
     /// holds nothing.
     pub fn stats(&self, i: usize) -> PixelStats {
         let share = || self.aovs.scalar(Aov::ShareOfSamples, i).unwrap_or(1.0);

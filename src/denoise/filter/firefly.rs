@@ -1,5 +1,5 @@
 //! Outliers cut before filtering, as a step of its own that says what it took away. Kernel: `glsl/filter/firefly.comp`. Twin:
-//! [`reference`].
+//! [`reference()`].
 use super::pixel::known_radiance;
 use super::{FilterInput, Planes};
 use crate::denoise::windows;

@@ -55,7 +55,7 @@ struct Shot<'a> {
 }
 
 impl Viewer<'_> {
-    /// The viewer as a part of a page, as [`Page::viewers`](super::Page::viewers) and other pages include it. Large images are
+    /// The viewer as a part of a page, as a [`Section`](super::Section) and other pages include it. Large images are
     /// shown without their borders, and images that do not fit into [`BUDGET`] are left out; the viewer says so.
     pub fn html(&self) -> String {
         self.html_within(BUDGET)
