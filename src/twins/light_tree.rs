@@ -4,7 +4,7 @@ use crate::math::hash::{pcg, unit_interval, word_of_unit};
 use crate::math::octahedral::{octahedral_decode, snorms};
 use crate::scene::Scene;
 use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS};
-use crate::shaders::shared::light_tree::{CHILDREN, COSINE_SLACK, LEAST_COSINES, UNIT_STEP};
+use crate::shaders::shared::light_tree::{CHILDREN, COSINE_SLACK, LARGEST_SEEN, LEAST_COSINES, UNIT_STEP};
 use crate::shaders::shared::pcg::BELOW_ONE;
 use glam::Vec3;
 
@@ -162,7 +162,8 @@ pub fn nominal_pdf(scene: &Scene, density: f32, solid_angle: f32, p: Vec3) -> f3
     let all = &scene.light_nodes[0];
     let to_all = Vec3::from(all.centre) - p;
     let others = 0.5 * all.power / to_all.length_squared().max(all.radius * all.radius).max(1e-30);
-    all.power * density / (density * solid_angle + others).max(1e-37)
+    let own = density * solid_angle.min(LARGEST_SEEN);
+    all.power * own / ((own + others) * solid_angle).max(1e-37)
 }
 
 #[cfg(test)]

@@ -321,3 +321,18 @@ fn sun_and_sky_of_one_colour_leave_no_noise_on_open_ground() {
         assert!((found / expected - 1.0).abs() < 1e-5, "pixel {i}: {found}, expected {expected}");
     }
 }
+
+/// A cube whose twelve triangles shine with 1 and reflect half: each point shows 1 + 1/2, since light comes to it from all of its
+/// hemisphere. The cosine alone chooses directions that all bring the same, and light samples of lamps nearby must not outweigh them.
+#[test]
+fn a_box_that_shines_all_round_has_little_noise() {
+    let scene = Workplace::new().scene(
+        "[film]\nwidth = 32\nheight = 32\n[camera]\nposition = [0.2, -0.1, 0.3]\ntarget = [0.0, 0.0, -1.0]\nfov = 90.0\n\
+         [render]\nspp = 64\nmax_depth = 2\n[[material]]\nname = 'wall'\ncolor = 0.5\nemission = 1.0\n\
+         [[mesh]]\nshape = 'cube'\nflip_normals = true\nmaterial = 'wall'\n",
+    );
+    assert!(scene.has_light_tree());
+    let (mean, variance) = mean_and_variance(&rendered(&scene));
+    println!("mean {mean}, variance of a sample {variance}");
+    assert!((mean - 1.5).abs() < 2e-3 && variance < 0.015, "{mean}, {variance}");
+}
