@@ -35,9 +35,8 @@ struct Direct {
 }
 
 impl Demodulated {
-    /// For `noisy` and images that hold the same. With `blurred`, the share of a pixel that its
-    /// lens blurs is filtered as it is. With `in_paint`, pixels without direct light take it from the others. Of what is filtered, `fireflies`
-    /// are cut.
+    /// For `noisy` and images that hold the same. With `in_paint`, pixels without direct light take it from the others; else, with
+    /// `blurred`, the share of a pixel that a lens blurs is filtered as it is. Of what is filtered, `fireflies` are cut.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the planes do not fit.

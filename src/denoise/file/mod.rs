@@ -125,9 +125,10 @@ impl<'a> Layers<'a> {
         }
     }
 
-    /// How far a lens blurs what the pixel shows.
+    /// How far a lens blurs what the pixel shows, from 0 to 1; 0 for what is no number.
     pub fn blur(&self, i: usize) -> f32 {
-        self.blur.map_or(0.0, |blur| blur[i])
+        let blur = self.blur.map_or(0.0, |blur| blur[i]);
+        if blur > 0.0 { blur.min(1.0) } else { 0.0 }
     }
 
     /// The surface, zero where nothing is known.

@@ -69,6 +69,9 @@ fn the_share_that_a_lens_blurs_is_filtered_as_it_is() {
     }
     let joined = parts.remodulate(&[[1.0, 1.0, 1.0, 2.0]; 3]);
     assert_eq!(joined, [[1.0; 3]; 3]);
+    film.channels.retain(|c| c.name != "denoising blur");
+    film.add("denoising blur", Samples::F32(vec![f32::NAN, -1.0, 2.0]));
+    assert_eq!(take_apart(&film, Demodulation::Light).factor, [[0.5; 3], [0.5; 3], [1.0; 3]]);
 }
 
 #[test]
