@@ -11,7 +11,10 @@ pub fn parse(text: &str) -> Result<Range<u32>, String> {
     };
     match found {
         Some((first, end)) if first < end => Ok(first..end),
-        _ => Err("expected frames such as 0..96, 0..=95 or 7".to_owned()),
+        Some((first, end)) => {
+            Err(format!("no frame lies from {first} on and before {end}: frames go forwards, such as 0..96"))
+        }
+        None => Err("expected frames such as 0..96, 0..=95 or 7, from 0 on".to_owned()),
     }
 }
 
@@ -25,5 +28,6 @@ mod tests {
         for wrong in ["", "a", "5..5", "9..3", "-1..3", "1..", "..4", "0..=4294967295", "1..2..3"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }
+        assert!(parse("9..3").unwrap_err().contains("from 9 on and before 3"));
     }
 }
