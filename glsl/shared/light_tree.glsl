@@ -113,13 +113,15 @@ uint choose_light(Receiver r, inout uint word, out float probability) {
     return light;
 }
 
+// Solid angle in steradians beyond which a lamp does not count as chosen more often: the tree does not choose it so, since all lamps that are
+// as near bring as much. Else lamps that stand on a floor had up to three times the noise there, and a closed box of 12 emitting triangles
+// seven times.
+const float LARGEST_SEEN = 0.25;
+
 // The density per solid angle that MIS takes for a point of a lamp of the tree, which is seen under `solid_angle` from `p` and has this
 // `density` over area by the table: as if the lamp were chosen by what it sends to `p` beside what all lamps do from the middle of
 // them, half as much as if they faced `p`. The true one is not known where a path meets the lamp; any will do that is the same however
-// a point of a lamp is found. A lamp that fills much of what is seen does not count as chosen more often: the tree does not choose it so,
-// since all lamps that are as near bring as much. Else lamps that stand on a floor had up to three times the noise there, and a closed box of 12
-// emitting triangles seven times.
-const float LARGEST_SEEN = 0.25; // steradians
+// a point of a lamp is found.
 float nominal_pdf(float density, float solid_angle, vec3 p) {
     LightNode all = LightNode_load(light_nodes, 0u);
     vec3 to_all = all.centre - p;

@@ -21,7 +21,7 @@ const uint LENS_RAYS = 8u;
 
 // A point of the lens for each ray, all of them spread evenly over the unit square (Hammersley 1960). All pixels have the same: noise in
 // guides would keep filters from neighbours that are alike.
-vec2 lens_point(uint k) { return vec2((float(k) + 0.5) / float(LENS_RAYS), float(bitfieldReverse(k)) * 2.3283064365386963e-10); }
+vec2 lens_point(uint k) { return vec2((float(k) + 0.5) / float(LENS_RAYS), unit_interval(bitfieldReverse(k))); }
 
 // Sums over the rays. What meets nothing has no position, and counts with a normal and a depth of 0.
 struct ThroughLens {

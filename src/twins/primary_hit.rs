@@ -1,6 +1,6 @@
 //! Twin of `glsl/trace/primary_hit.comp` and of `glsl/shared/first_hit.glsl`.
 use crate::layout::{Camera, FrameConstants, Guide, NONE, SurfacePoint};
-use crate::math::hash::pcg;
+use crate::math::hash::{pcg, unit_interval};
 use crate::scene::Scene;
 use crate::shaders::primary_hit::LENS_RAYS;
 use crate::twins::bsdf::{bsdf_albedo, bsdf_chooses, bsdf_is_delta, bsdf_sample};
@@ -29,7 +29,7 @@ pub fn through_lens(scene: &Scene, frame: &FrameConstants, pixel: u32) -> (Guide
     let (mut sum, mut hits, mut blur) = ([Vec3::ZERO; 3], 0.0, 0.0);
     let mut depths = 0.0;
     for k in 0..LENS_RAYS {
-        let point = vec2((k as f32 + 0.5) / LENS_RAYS as f32, k.reverse_bits() as f32 * 0.5f32.powi(32));
+        let point = vec2((k as f32 + 0.5) / LENS_RAYS as f32, unit_interval(k.reverse_bits()));
         let ray = camera_ray(&frame.camera, film, point);
         let Guide { normal, position, albedo, depth, .. } =
             seen_hit(scene, frame, &ray, pcg(pixel).wrapping_add(k + 1)).guide;
