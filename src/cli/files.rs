@@ -46,6 +46,8 @@ pub struct Files {
     own: BTreeMap<PathBuf, PathBuf>,
     /// Requested paths that could not be written, with the error and where the file is instead.
     failures: Vec<(PathBuf, String)>,
+    /// Whether the same command makes them again. What cannot be written is not put elsewhere then.
+    again: bool,
 }
 
 /// Name for an incomplete file: `a.partial.exr` for `a.exr`.
@@ -67,7 +69,13 @@ impl Files {
     /// `resumed` is the file that this run continues and therefore may replace.
     pub fn new(resumed: Option<&Path>) -> Self {
         let own = resumed.map(|path| (key(path), path.to_owned())).into_iter().collect();
-        Self { own, failures: Vec::new() }
+        Self { own, ..Self::default() }
+    }
+
+    /// Those of a frame. The same command renders a frame again whose files are missing, and frames that were put elsewhere would
+    /// pile up there with each run.
+    pub fn of_frame() -> Self {
+        Self { again: true, ..Self::default() }
     }
 
     /// From now on what is written to `path` goes to `place`, because an earlier run of the same work put it there.
@@ -170,11 +178,12 @@ impl Files {
         Ok(place)
     }
 
-    /// Saves a file that could not be written in the working folder or in the folder for temporary files.
+    /// Saves a file that could not be written in the working folder or in the folder for temporary files, unless it is made again.
     fn put_elsewhere(&mut self, item: &Item, failure: &Error) -> Option<PathBuf> {
         let name = item.path.file_name()?;
         let places = [PathBuf::from(name), std::env::temp_dir().join(name)];
-        let put = places.iter().find_map(|place| output::write_new(place, |stream| (item.fill)(stream)).ok());
+        let mut places = places.iter().filter(|_| !self.again);
+        let put = places.find_map(|place| output::write_new(place, |stream| (item.fill)(stream)).ok());
         let failure = match failure {
             Error::Output { what, .. } => what.clone(),
             other => other.to_string(),

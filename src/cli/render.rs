@@ -8,6 +8,7 @@ mod taken;
 
 use super::checkpoint;
 use super::common::{Common, PngOptions};
+use super::files::Files;
 use super::overrides::Overrides;
 use super::{Exit, complain};
 use crate::denoise;
@@ -159,7 +160,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         );
     }
     let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
-    let taken = shoot(args, &gpu, &scene, job, host)?;
+    let files = Files::new(args.resume.as_deref());
+    let taken = shoot(args, &gpu, &scene, job, files, host)?;
     let can_resume = renderer.can_resume();
     // The film is all that is left to write and to filter, and large films need the memory.
     drop(renderer);

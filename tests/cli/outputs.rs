@@ -32,6 +32,21 @@ fn an_output_that_fails_keeps_no_other_from_being_written() {
     assert!(folder.path().join("c.png").exists() && !folder.path().join("a.exr").exists());
 }
 
+#[test]
+fn a_frame_that_cannot_be_written_is_left_to_the_same_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name);
+    std::fs::create_dir(inside("frames")).unwrap();
+    std::os::unix::fs::symlink("/dev/full", inside("frames/a.0.exr")).unwrap();
+    let words = format!("sequence {} {SMALL} --spp 1 --frames 0..2 -o frames/a.#.exr", scene());
+    let output = run(&folder, &words);
+    complains(&output, 6, &["error: frame 0: frames/a.0.exr: cannot be written", "free some space"]);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "{output:?}");
+    std::fs::remove_file(inside("frames/a.0.exr")).unwrap();
+    well(&run(&folder, &words));
+    assert!(["frames/a.0.exr", "frames/a.1.exr"].iter().all(|name| image::read(&inside(name)).is_ok()));
+}
+
 /// Interrupts a render whose folder has gone.
 fn lost_folder(folder: &TempDir, cwd: &str) -> Output {
     let inside = |name: &str| folder.path().join(name);

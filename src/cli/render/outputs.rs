@@ -69,7 +69,7 @@ pub fn save(
 pub fn save_pictures(args: &Args, film: &Film) -> Result<()> {
     let mut items = items(args, film);
     items.retain(|item| !image::has_layers(&item.path) || !item.path.exists());
-    let mut files = Files::default();
+    let mut files = Files::of_frame();
     files.save(&items, true);
     files.pipe(&items, true);
     files.check()

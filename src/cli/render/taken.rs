@@ -39,16 +39,23 @@ pub struct Taken<'a> {
 /// A signal and a checkpoint wait for a step.
 const STEP_TIME: Duration = Duration::from_secs(1);
 
-/// Takes the samples of a job, or of the one pixel that is asked for; none when it was interrupted before the first.
+/// Takes the samples of a job, or of the one pixel that is asked for; none when it was interrupted before the first. `files` are those
+/// that the run has written or may replace.
 ///
 /// # Errors
 /// [`crate::error::Error::Device`].
-pub fn shoot<'a>(args: &Args, gpu: &'a Gpu, scene: &'a Scene, job: Job, mut host: Spans) -> Result<Option<Taken<'a>>> {
+pub fn shoot<'a>(
+    args: &Args,
+    gpu: &'a Gpu,
+    scene: &'a Scene,
+    job: Job,
+    mut files: Files,
+    mut host: Spans,
+) -> Result<Option<Taken<'a>>> {
     let settings = job.renderer.settings();
     let noisy = args.filter(settings).map(|_| Noisy::of_film(job.renderer)).transpose()?;
     let pixel = args.pixel.map(|[x, y]| y * settings.width + x);
     let shot = Shot { args, gpu, job: Job { step_time: Some(STEP_TIME), pixel, ..job } };
-    let mut files = Files::new(args.resume.as_deref());
     let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
     if status.stopped == StopReason::Interrupted && status.traced == 0 {
         return Ok(None);

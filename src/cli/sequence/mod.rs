@@ -25,8 +25,8 @@ use std::time::{Duration, Instant};
 ///
 /// Frame n shows the scene n / fps seconds after the start of its `[[animation]]` tables. Files have `####` for the number of the
 /// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose, settings and filter is not rendered
-/// again; its other pictures are written anew. A frame that fails does not stop the others: the exit code is 6 then. A camera without
-/// position has in view what all of --frames reach.
+/// again; its other pictures are written anew. A frame that fails, or cannot be written, does not stop the others: the exit code is 6
+/// then, and the same command renders it again. A camera without position has in view what all of --frames reach.
 ///
 /// With --reproject forward a frame begins with samples of the one before, and so depends on all before it. The first frame that is
 /// asked for, and one after a frame that failed, begins anew: --only 40..48 is the same sequence begun at frame 40. A run that goes

@@ -4,7 +4,7 @@ use super::preview::Preview;
 use super::survey::Survey;
 use super::{Args, FrameReport};
 use crate::cli::Exit;
-use crate::cli::files::first_with_layers;
+use crate::cli::files::{Files, first_with_layers};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
 use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
@@ -183,7 +183,7 @@ impl<'a> Stage<'a> {
     fn shoot(&self, args: &render::Args, settings: &Settings, carries: bool) -> Result<Option<render::Taken<'_>>> {
         let renderer = self.renderer()?;
         let job = Job { carries, ..Job::new(renderer) };
-        let mut shot = render::shoot(args, &self.gpu, &self.scene, job, Spans::default())?;
+        let mut shot = render::shoot(args, &self.gpu, &self.scene, job, Files::of_frame(), Spans::default())?;
         if let Some(shot) = shot.as_mut().filter(|_| self.reproject.is_some()) {
             renderer.add_history(shot.film_mut(), &self.scene)?;
             self.chain.tell(shot.film_mut(), &self.scene, settings)?;
