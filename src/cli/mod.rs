@@ -140,7 +140,12 @@ fn usage(e: &clap::Error, words: &[OsString]) -> Result<Exit> {
         ));
     }
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
-    let parts = text.split("\n\n").map(one_line).filter(|p| !p.starts_with("Usage:") && !p.starts_with("For more"));
+    // Of an option that needs another one only the usage says the name.
+    let tells = |p: &String| match e.kind() {
+        ErrorKind::MissingRequiredArgument => !p.starts_with("For more"),
+        _ => !p.starts_with("Usage:") && !p.starts_with("For more"),
+    };
+    let parts = text.split("\n\n").map(one_line).filter(tells);
     let message = parts.collect::<Vec<_>>().join("; ");
     let (message, command) = (message.trim_start_matches("error: "), Cli::command());
     let subcommand = words.get(1).and_then(|word| command.find_subcommand(word));

@@ -35,6 +35,9 @@ fn usage_errors_are_one_line_and_exit_2() {
     complains(&run(&[]), 2, &["error: name a command"]);
     complains(&run(&["compare", "a.exr"]), 2, &["<B>", "(see tallow compare --help)"]);
     complains(&run(&["--compare"]), 2, &["(see tallow --help)"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--map", "m.png"]), 2, &["--statistical", "--map"]);
+    let limited = run(&["compare", "a.exr", "b.exr", "--statistical", "--max-mse", "1"]);
+    complains(&limited, 2, &["'--statistical' cannot be used with '--max-mse <N>'"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--max-mes", "1"]), 2, &["'--max-mes'", "tip:", "'--max-mse'"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--min-psnr", "nan"]), 2, &["finite"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--diff", "d.exr"]), 2, &["d.exr", ".png"]);

@@ -327,6 +327,8 @@ fn options_that_cannot_be_are_one_line() {
         ("--frames 0..3 --fps 30/0", "choose a number above 0"),
         ("--frames 0..3 --pixel 1,1", "--pixel is for one image"),
         ("--frames 0..3 --checkpoint 1", "--checkpoint is for one image"),
+        ("--error .02", "--error is for one image: leave it out, or use tallow render"),
+        ("--time 2s --pixel 1,1 --denoise auto", "is for one image"),
         ("--frames 0..3 --min-spp 1 --max-spp 1", "max-spp is 1: the policy uniform"),
         ("--frames 0..3 --preview a.png", "a preview goes to a .gif"),
         ("--only 99999", "none of the frames"),

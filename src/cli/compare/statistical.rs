@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// Test whether A and B have the same expectation, given the noise that their layers m2, samples or variance tell of:
     /// by pixels, blocks, objects and as a whole
-    #[arg(long, conflicts_with_all = ["layer", "diff", "Limits"])]
+    #[arg(long, conflicts_with_all = ["layer", "diff", "max_mse", "max_relmse", "max_flip", "min_psnr", "min_ssim"])]
     pub statistical: bool,
     /// How often images that are the same may be called different
     #[arg(long, value_name = "RATE", default_value_t = Options::default().false_alarms, requires = "statistical",

@@ -13,6 +13,8 @@ use crate::error::{Error, Result};
 use crate::image;
 use crate::render::{Carriage, Reproject, ReprojectOverrides};
 use crate::scene::description::numbered;
+use clap::builder::Resettable;
+use clap::{Arg, Id};
 use preview::Preview;
 use serde::Serialize;
 use stage::Stage;
@@ -39,7 +41,7 @@ use std::time::{Duration, Instant};
     mut_args(with_ranges(Reproject::default().entries())),
     mut_arg("outputs", |arg| arg.help("Image to write: .exr (all layers), .png or .hdr, with #### for the number of the frame; may be \
         given several times [default: the scene's name, its folder's for a file called scene, + .####.exr]")),
-    mut_args(|arg| { let hide = OF_ONE.iter().any(|(id, _)| arg.get_id() == id); if hide { arg.hide(true) } else { arg } }),
+    mut_args(without_those_of_one),
 )]
 pub struct Args {
     /// Frames: 0..96 are 96 frames, 0..=96 one more, 7 is one [default: up to the last key of all that moves]
@@ -84,6 +86,14 @@ const OF_ONE: [(&str, IsGiven); 6] = [
     ("error", |args| args.error.is_some()),
     ("plan", |args| args.plan.is_some()),
 ];
+
+/// Hides the options for one image. They conflict with no other option, so that what is said of them is what [`Args::check`] says.
+fn without_those_of_one(arg: Arg) -> Arg {
+    match OF_ONE.iter().any(|(id, _)| arg.get_id() == id) {
+        true => arg.hide(true).conflicts_with(Resettable::<Id>::Reset),
+        false => arg,
+    }
+}
 
 impl Args {
     /// The options of one frame, whose files have its number.
@@ -130,7 +140,8 @@ impl Args {
     fn check(&self) -> Result<()> {
         if let Some((option, _)) = OF_ONE.iter().find(|(_, is_given)| is_given(&self.render)) {
             return Err(Error::Usage(format!(
-                "--{option} is for one image: a sequence goes on where it stopped by itself"
+                "--{option} is for one image: leave it out, or use tallow render; a sequence takes the samples that --spp says, and \
+                 goes on by itself where it stopped"
             )));
         }
         let first = match &self.frames {
