@@ -35,7 +35,7 @@ pub struct Common {
     /// Run under the Vulkan validation layers and fail on any message
     #[arg(long)]
     pub validation: bool,
-    /// Print one JSON object at the end
+    /// Print one JSON object at the end. Without a result nothing goes to stdout: the exit code and stderr say why
     #[arg(long)]
     pub json: bool,
     /// Print nothing but errors

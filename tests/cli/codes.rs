@@ -66,6 +66,8 @@ fn input_errors_name_the_file_and_exit_3() {
     complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--layer", "N"]), 3, &["\"N\"", "albedo.R"]);
     let render = |scene: &str| tallow(&folder, &["render", scene]);
     complains(&render("missing"), 3, &["error: missing: cannot be read: No such file"]);
+    let read_by_a_job = tallow(&folder, &["render", "missing", "--json"]);
+    assert!(read_by_a_job.stdout.is_empty(), "{read_by_a_job:?}");
     complains(&render("missing.blend"), 3, &["missing.blend: cannot be read: No such file"]);
     complains(&render("text.png"), 3, &["text.png", "is no scene", "toml, obj, ply, ply.gz, gltf, glb"]);
     // Control: what is right gives no line.
