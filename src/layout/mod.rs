@@ -100,8 +100,7 @@ mod scene;
 pub use allocate::*;
 pub use constants::*;
 pub use effects::*;
-#[doc(hidden)] // what the filters tell their own kernels; tests tell the same to their CPU twins
-pub use filter::*;
+pub(crate) use filter::*;
 pub use path::*;
 pub use pixel::*;
 pub use reproject::*;
