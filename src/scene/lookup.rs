@@ -48,11 +48,11 @@ fn wrapped(x: f32, clamped: bool, mirrored: bool) -> f32 {
     }
 }
 
-fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
+fn texture_texel(texels: &[u32], image: &Texture, at: IVec2) -> Vec4 {
     let edge = ivec2(image.width as i32, image.height as i32);
     let [clamped, mirrored] = modes(image);
     let [x, y] = [0, 1].map(|i| into_range(at[i], edge[i], clamped[i] || mirrored[i]));
-    let word = scene.texels[image.first as usize + (y * edge.x + x) as usize];
+    let word = texels[image.first as usize + (y * edge.x + x) as usize];
     if image.flags & TEXTURE_FLOAT != 0 {
         return Vec4::splat(f32::from_bits(word));
     }
@@ -66,7 +66,11 @@ fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
 
 /// Texture value at `uv`, interpolated bilinearly.
 pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
-    let image = &scene.textures[index as usize];
+    picture_sample(&scene.texels, &scene.textures[index as usize], uv)
+}
+
+/// The same of a picture among these texels.
+pub fn picture_sample(texels: &[u32], image: &Texture, uv: Vec2) -> Vec4 {
     let turned = if image.flags & TEXTURE_SHEARED != 0 { uv.yx() * Vec2::from(image.shear) } else { Vec2::ZERO };
     let uv = uv * Vec2::from(image.scale) + Vec2::from(image.offset) + turned;
     let [clamped, mirrored] = modes(image);
@@ -75,7 +79,7 @@ pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
     let at = if image.flags & TEXTURE_NEAREST != 0 { (at + 0.5).floor() } else { at };
     let corner = at.floor().as_ivec2();
     let f = at - corner.as_vec2();
-    let texel = |dx, dy| texture_texel(scene, image, corner + ivec2(dx, dy));
+    let texel = |dx, dy| texture_texel(texels, image, corner + ivec2(dx, dy));
     let top = texel(0, 0).lerp(texel(1, 0), f.x);
     let low = texel(0, 1).lerp(texel(1, 1), f.x);
     top.lerp(low, f.y)

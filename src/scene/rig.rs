@@ -1,5 +1,6 @@
 //! What can move in a scene: what is kept of its description so that a [`Pose`](super::Pose) finds it.
 use super::Scene;
+use super::build::brightness::Reduced;
 use super::build::bvh::Bounds;
 use super::build::coat::reads_table;
 use super::build::soft::Soft;
@@ -41,6 +42,8 @@ pub struct Rig {
     pub(in crate::scene) dimness: i32,
     /// Mean colours of pictures that emit or mask, by `texture::mean_key`.
     pub(in crate::scene) means: HashMap<(u32, u32), [f32; 3]>,
+    /// Smaller forms of the large ones of them.
+    pub(in crate::scene) reduced: HashMap<(u32, u32), Reduced>,
     /// Materials that have a table of their coat.
     pub(in crate::scene) tabled: HashSet<u32>,
     /// Fingerprint of the scene as it was loaded.

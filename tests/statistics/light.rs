@@ -384,8 +384,12 @@ fn what_is_left_of_a_choice_is_independent_of_it() {
     assert!(word_itself < sidak(1), "control: the word that chose");
 }
 
-/// Variance of the mean of 64 light samples' irradiance on a floor, over many pixels.
 fn variance(scene: &Loaded, independent: bool) -> f64 {
+    moments(scene, independent)[1]
+}
+
+/// Of the mean of 64 light samples' irradiance on a floor, the mean and the variance over many pixels.
+fn moments(scene: &Loaded, independent: bool) -> [f64; 2] {
     let irradiance = |pixel: u32| {
         let sample = |i| {
             let s = sampler_start(pixel, i, 1, independent);
@@ -396,7 +400,28 @@ fn variance(scene: &Loaded, independent: bool) -> f64 {
     };
     let all: Vec<f64> = (0..400).map(irradiance).collect();
     let mean = all.iter().sum::<f64>() / 400.0;
-    all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 399.0
+    [mean, all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 399.0]
+}
+
+/// Light samples of a lamp with a picture beside those of one that is not split, since it may be deformed.
+#[test]
+fn lamps_with_a_picture_are_sampled_where_it_is_bright() {
+    let patch = |x: u32, y: u32| if (8..12).contains(&x) && (3..7).contains(&y) { [255; 3] } else { [30; 3] };
+    let place = Workplace::new().picture("patch.png", 16, patch);
+    let lamp = |moving: bool| {
+        place.scene(&format!(
+            "[[material]]\nname = 'a'\nemission = 9.0\nemission_texture = 'patch.png'\n\
+             [[mesh]]\nname = 'lamp'\nshape = 'rectangle'\nmaterial = 'a'\nmoving = {moving}\n\
+             transform = {{ rotate = [90.0, 0.0, 0.0], translate = [0.1, 1.5, 0.0] }}\n"
+        ))
+    };
+    let (split, whole) = (lamp(false), lamp(true));
+    assert_eq!(whole.lights.len(), 2);
+    let ([mean, noise], [expected, noise_of_whole]) = (moments(&split, true), moments(&whole, true));
+    let error = ((noise + noise_of_whole) / 400.0).sqrt();
+    assert!((mean - expected).abs() < 4.0 * error, "{mean}, not {expected}, to {error}");
+    println!("{} lamps: {:.3} of the variance", split.lights.len(), noise / noise_of_whole);
+    assert!(noise < 0.1 * noise_of_whole, "{noise}, {noise_of_whole}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Calls the steps from a description to the flat arrays: it reads files, places meshes, builds BVHs, decodes textures and makes the
 //! table of lights.
 use super::bake;
+use super::brightness;
 use super::coat;
 use super::environment;
 use super::geometry::Geometry;
@@ -8,6 +9,7 @@ use super::hierarchy;
 use super::lights;
 use super::plan;
 use super::sources::Sources;
+use super::split;
 use super::store;
 use crate::error::{Error, Result};
 use crate::layout::*;
@@ -39,11 +41,26 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     let mut sources = Sources::new(path, description)?;
     // Textures are decoded while geometry is read: on two cores Crytek Sponza is ready a quarter sooner.
     let early = sources.library.materials.textures.clone();
-    let (decoded, done) = rayon::join(|| early.decode(), || geometry(&mut sources, choices.still, scene));
-    done?;
+    let (decoded, placed) = rayon::join(
+        || early.decode(),
+        || {
+            sources.read_files()?;
+            match sources.library.materials.list.iter().any(split::is_pictured) {
+                true => Ok(None), // lamps are split by what their pictures show
+                false => geometry(&mut sources, choices.still, scene).map(Some),
+            }
+        },
+    );
+    let placed = placed?;
     let decoded = sources.library.materials.textures.decode_after(decoded?)?;
-    let attributes = std::mem::replace(&mut scene.texels, decoded.texels);
-    scene.textures = decoded.textures;
+    (scene.textures, scene.texels) = (decoded.textures, decoded.texels);
+    let attributes = match placed {
+        Some(attributes) => attributes,
+        None => {
+            brightness::read_pictures(&sources.library.materials.list, scene);
+            geometry(&mut sources, choices.still, scene)?
+        }
+    };
     add_attributes(path, attributes, scene)?;
     let mut warnings = add_materials(sources.library, scene);
     let emits = |t: &Triangle| scene.materials[t.material as usize].emission != [0.0; 3];
@@ -98,20 +115,18 @@ fn add_attributes(path: &Path, words: Vec<u32>, scene: &mut Scene) -> Result<()>
     Ok(())
 }
 
-/// Everything but textures.
-fn geometry(sources: &mut Sources, still: bool, scene: &mut Scene) -> Result<()> {
-    sources.read_files()?;
+/// Everything but textures; returns the words of vertices' attributes.
+fn geometry(sources: &mut Sources, still: bool, scene: &mut Scene) -> Result<Vec<u32>> {
     environment::add_lights(sources, scene)?;
     let plan = plan::plan(sources)?;
     let plan = if still { bake::bake(sources, plan) } else { plan };
     let mut geometry = Geometry::default();
-    let stored = store::store(sources, &plan, &mut geometry)?;
+    let stored = store::store(sources, &plan, scene, &mut geometry)?;
     scene.content.add(&geometry.triangles);
     scene.content.add(&geometry.shading);
     hierarchy::build(sources, &plan, stored, &mut geometry, scene)?;
     (scene.triangles, scene.shading) = (geometry.triangles, geometry.shading);
-    scene.texels = geometry.attributes; // until textures are decoded
-    Ok(())
+    Ok(geometry.attributes)
 }
 
 /// Moves the materials into the scene; returns the warnings.

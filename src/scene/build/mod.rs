@@ -16,4 +16,5 @@ pub mod lights;
 pub mod plan;
 pub mod soft;
 pub mod sources;
+pub mod split;
 pub mod store;

@@ -4,6 +4,7 @@ use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::plan::{Job, Plan, override_of};
 use super::soft::Soft;
 use super::sources::{Sources, mesh_name};
+use super::split::{self, Lamps};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::scene::description::mesh::Mesh;
@@ -11,7 +12,7 @@ use crate::scene::description::{self, MeshTable};
 use crate::scene::load::material::has_normal_map;
 use crate::scene::load::obj::ObjFile;
 use crate::scene::load::obj_part::Part;
-use crate::scene::{BYTES_OF_TRIANGLE, MAX_COORDINATE};
+use crate::scene::{BYTES_OF_TRIANGLE, MAX_COORDINATE, Scene};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -33,11 +34,12 @@ pub struct Stored {
     pub soft: Option<Soft>,
 }
 
-/// Puts all triangles into the array; world space comes first, and is always there. Files are dropped after their last use.
+/// Puts all triangles into the array; world space comes first, and is always there. Files are dropped after their last use. Lamps are split
+/// by the pictures of `scene`.
 ///
 /// # Errors
 /// For an unknown group or material, coordinates that are too large, and [`Error::Memory`].
-pub fn store(sources: &mut Sources, plan: &Plan, geometry: &mut Geometry) -> Result<Vec<Stored>> {
+pub fn store(sources: &mut Sources, plan: &Plan, scene: &Scene, geometry: &mut Geometry) -> Result<Vec<Stored>> {
     let jobs: Vec<&Job> = plan.baked.iter().chain(&plan.stored).collect();
     let triangles: u64 = jobs.iter().map(|job| triangles_of(sources, job)).sum();
     let words = jobs.iter().map(|job| attribute_words(sources, job)).sum::<u64>();
@@ -48,12 +50,17 @@ pub fn store(sources: &mut Sources, plan: &Plan, geometry: &mut Geometry) -> Res
     let files: Vec<_> = jobs.iter().map(|job| sources.file_of(&description.mesh[job.mesh])).collect();
     let latest: HashMap<_, _> = files.iter().enumerate().map(|(i, file)| (file, i)).collect();
     let last: Vec<bool> = files.iter().enumerate().map(|(i, file)| latest[file] == i).collect();
+    let materials = sources.library.materials.list.clone();
+    let lamps = Lamps { scene, materials: &materials };
+    let counts = jobs.iter().map(|job| lamps_of(sources, plan, job, lamps)).collect::<Result<Vec<_>>>()?;
+    let depths = split::depths(&counts);
     let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new(), soft: None }];
     for (i, job) in jobs.into_iter().enumerate() {
         let start = geometry.triangles.len();
         let baked = i < plan.baked.len();
         let first = if baked { stored[0].objects.len() as u32 } else { 0 };
-        let (objects, soft) = Addition::new(sources, job, first)?.add(sources, geometry, last[i])?;
+        let (objects, soft) =
+            Addition::new(sources, job, first, (lamps, depths[i]))?.add(sources, geometry, last[i])?;
         let end = geometry.triangles.len();
         if baked {
             stored[0].objects.extend(objects);
@@ -64,6 +71,25 @@ pub fn store(sources: &mut Sources, plan: &Plan, geometry: &mut Geometry) -> Res
     }
     sources.files.clear();
     Ok(stored)
+}
+
+/// How many triangles with a picture of emission a mesh shows that can be split: those of one that moves are counted by who moves it.
+fn lamps_of(sources: &Sources, plan: &Plan, job: &Job, lamps: Lamps) -> Result<u64> {
+    let table = &sources.description.mesh[job.mesh];
+    if table.moving || job.exact {
+        return Ok(0);
+    }
+    let file = sources.file_of(table).and_then(|path| sources.files.get(&path));
+    let triangles = match (override_of(sources, job)?, file) {
+        (Some(worn), file) if lamps.has_picture(worn) => triangles(table, file),
+        (None, Some(file)) => {
+            let lit = parts_of(table, file).filter(|(part, _)| lamps.has_picture(part.material));
+            lit.map(|(part, _)| part.mesh.triangles() as u64).sum()
+        }
+        _ => 0,
+    };
+    let copies = || plan.copies.iter().filter(|copy| copy.mesh == job.mesh).count().max(1) as u64;
+    Ok(if triangles > 0 { copies() * triangles } else { 0 })
 }
 
 /// How many triangles a mesh has before any is dropped.
@@ -122,7 +148,7 @@ fn warn_of_grey(sources: &mut Sources, plan: &Plan) -> Result<()> {
 }
 
 /// A mesh on its way into the triangle array.
-struct Addition<'a> {
+struct Addition<'a, 'l> {
     job: Job,
     table: &'a MeshTable,
     place: String,
@@ -134,10 +160,12 @@ struct Addition<'a> {
     /// Whether some texture reads second coordinates, and whether some material needs tangents.
     second: bool,
     tangents: bool,
+    /// What splits lamps, and how often they may be quartered.
+    lamps: (Lamps<'l>, u32),
 }
 
-impl<'a> Addition<'a> {
-    fn new(sources: &Sources<'a>, job: &Job, first: u32) -> Result<Self> {
+impl<'a, 'l> Addition<'a, 'l> {
+    fn new(sources: &Sources<'a>, job: &Job, first: u32, lamps: (Lamps<'l>, u32)) -> Result<Self> {
         let table = &sources.description.mesh[job.mesh];
         // Meshes from memory without normals are flat on purpose: there all vertices have one, or none has.
         let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
@@ -150,7 +178,7 @@ impl<'a> Addition<'a> {
         let tangents = stretched || materials.list.iter().any(has_normal_map);
         let place = format!("mesh \"{}\"", mesh_name(table));
         let material = override_of(sources, job)?;
-        Ok(Self { job: *job, table, place, material, placement, first, second, tangents })
+        Ok(Self { job: *job, table, place, material, placement, first, second, tangents, lamps })
     }
 
     /// Adds the triangles; returns the names of the objects, and what it takes to deform them.
@@ -298,7 +326,12 @@ impl<'a> Addition<'a> {
                 uv: corners(&mesh.uvs, triangle),
                 extras,
             };
-            geometry.push(&c, Tag { primitive: first.primitive + t, ..first }, &self.placement, &mut repairs)?;
+            let (tag, (lamps, depth)) = (Tag { primitive: first.primitive + t, ..first }, self.lamps);
+            for (part, c) in lamps.split(&c, tag.material, depth).iter().enumerate() {
+                let mut again = Repairs::default(); // what is wrong is counted once
+                let repairs = if part == 0 { &mut repairs } else { &mut again };
+                geometry.push(c, tag, &self.placement, repairs)?;
+            }
         }
         Ok((geometry, repairs))
     }

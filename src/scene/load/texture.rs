@@ -251,28 +251,49 @@ pub fn mean_key(texture: &Texture) -> (u32, u32) {
 
 /// Mean linear colour of a picture.
 pub fn mean(texture: &Texture, texels: &[u32]) -> [f32; 3] {
-    let count = texture.width as usize * texture.height as usize;
-    let own = &texels[texture.first as usize..][..count];
-    if texture.flags & (TEXTURE_RGB9E5 | TEXTURE_FLOAT) != 0 {
-        let floats = texture.flags & TEXTURE_FLOAT != 0;
-        let of = |word: u32| if floats { [f32::from_bits(word); 3] } else { rgb9e5::unpack(word) };
-        let sum = own.iter().fold([0f64; 3], |sum, &word| {
-            let rgb = of(word);
-            std::array::from_fn(|c| sum[c] + f64::from(rgb[c]))
-        });
-        return sum.map(|s| (s / count as f64) as f32);
+    mean_of(&linear(texture), own_texels(texture, texels).iter().copied())
+}
+
+/// A picture in which every texel is the mean of those that it stands for: with `width` and `height` texels, which are fewer.
+pub fn reduced(texture: &Texture, texels: &[u32], width: u32, height: u32) -> Vec<u32> {
+    let (own, linear) = (own_texels(texture, texels), linear(texture));
+    let edge = |i: u32, to: u32, from: u32| (u64::from(i) * u64::from(from) / u64::from(to)) as usize;
+    let range = |i: u32, to: u32, from: u32| edge(i, to, from)..edge(i + 1, to, from);
+    let texel = |i: u32| {
+        let (columns, rows) = (range(i % width, width, texture.width), range(i / width, height, texture.height));
+        let words = rows.flat_map(|row| &own[row * texture.width as usize..][columns.clone()]);
+        rgb9e5::pack(mean_of(&linear, words.copied()))
+    };
+    (0..width * height).into_par_iter().map(texel).collect()
+}
+
+fn own_texels<'t>(texture: &Texture, texels: &'t [u32]) -> &'t [u32] {
+    &texels[texture.first as usize..][..texture.width as usize * texture.height as usize]
+}
+
+fn mean_of(linear: &impl Fn(u32) -> [f64; 3], words: impl Iterator<Item = u32>) -> [f32; 3] {
+    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    for word in words {
+        let rgb = linear(word);
+        (0..3).for_each(|c| sum[c] += rgb[c]);
+        count += 1.0;
     }
-    let srgb = texture.flags & TEXTURE_SRGB != 0;
+    sum.map(|s| (s / count) as f32)
+}
+
+/// What tells the linear colour of a word of a picture.
+fn linear(texture: &Texture) -> impl Fn(u32) -> [f64; 3] + Sync {
+    let has = |bit: u32| texture.flags & bit != 0;
+    let [floats, shared, srgb] = [TEXTURE_FLOAT, TEXTURE_RGB9E5, TEXTURE_SRGB].map(has);
     let curve: [f64; 256] = std::array::from_fn(|byte| {
         let code = byte as f64 / 255.0;
         if srgb { linear_from_srgb_f64(code) } else { code }
     });
-    let mut sum = [0.0; 3];
-    for texel in own {
-        let bytes = texel.to_le_bytes();
-        (0..3).for_each(|c| sum[c] += curve[bytes[c] as usize]);
+    move |word| match word.to_le_bytes() {
+        _ if floats => [f64::from(f32::from_bits(word)); 3],
+        _ if shared => rgb9e5::unpack(word).map(f64::from),
+        [r, g, b, _] => [r, g, b].map(|byte| curve[byte as usize]),
     }
-    sum.map(|s| (s / count as f64) as f32)
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Pictures and what becomes of them.
 use super::*;
+use glam::Vec3;
 
 fn decode(bytes: &[u8], name: &str, kind: Kind) -> Result<Decoded> {
     let dir = tempfile::tempdir().unwrap();
@@ -36,6 +37,19 @@ fn the_mean_is_taken_in_linear_light() {
     let grey = decode(&png(1, 1, &[188, 188, 128]), "a.png", Kind::Color).unwrap();
     let light = mean(&grey.textures[0], &grey.texels);
     assert!((light[0] - 0.5).abs() < 0.005 && (light[2] - 0.2158).abs() < 0.005, "{light:?}");
+}
+
+#[test]
+fn reduced_pictures_keep_their_mean() {
+    let bytes: Vec<u8> = (0..5 * 3 * 3).map(|i| (i * i * 37 % 256) as u8).collect();
+    let of = decode(&png(5, 3, &bytes), "a.png", Kind::Color).unwrap();
+    let texels = reduced(&of.textures[0], &of.texels, 2, 3);
+    // Blocks of 2 and of 3 texels.
+    let block = |i: usize| Vec3::from(rgb9e5::unpack(texels[i]));
+    let found = (0..3).map(|row| 2.0 * block(2 * row) + 3.0 * block(2 * row + 1)).sum::<Vec3>() / 15.0;
+    assert!(texels.len() == 6 && found.abs_diff_eq(mean(&of.textures[0], &of.texels).into(), 2e-3), "{found}");
+    let first = [0, 1].map(|i| linear_from_srgb_f64(f64::from(bytes[3 * i]) / 255.0) as f32);
+    assert!((block(0).x - 0.5 * (first[0] + first[1])).abs() < 2e-3, "{}", block(0));
 }
 
 #[test]
