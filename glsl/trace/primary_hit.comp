@@ -41,12 +41,12 @@ void add_ray(inout ThroughLens sum, Guide shown, Ray ray) {
     sum.guide.albedo += shown.albedo;
 }
 
-// Of several surfaces, none is named.
+// Of several surfaces, none is named: see shared/blurred.glsl.
 Guide mean_guide(ThroughLens sum) {
     const float SHARE = 1.0 / float(LENS_RAYS);
     Guide mean = sum.guide;
     mean.object = sum.hits > 0u ? 0u : NONE;
-    mean.material = NONE;
+    mean.material = sum.blur > 0.0 ? NONE : 0u;
     float len = length(sum.guide.normal);
     mean.normal = len > 0.0 ? sum.guide.normal / len : vec3(0.0);
     mean.depth = SHARE * sum.guide.depth;

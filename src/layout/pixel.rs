@@ -17,7 +17,7 @@ gpu_structs! {
         object: uint,
         /// Reflectance of the first hit that indirect light is divided by, linear Rec. 709; 0 for mirrors and clear glass.
         albedo: vec3,
-        /// Index of the material, or [`NONE`].
+        /// Index of the material, or [`NONE`]: where nothing was hit and, for filters, where a lens blurs what the pixel shows.
         material: uint,
     }
 

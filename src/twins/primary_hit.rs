@@ -49,7 +49,7 @@ pub fn through_lens(scene: &Scene, frame: &FrameConstants, pixel: u32) -> (Guide
         position: (position / f32::max(hits, 1.0)).into(),
         object: if hits > 0.0 { 0 } else { NONE },
         albedo: (albedo / rays).into(),
-        material: NONE,
+        material: if blur > 0.0 { NONE } else { 0 },
         ..Default::default()
     };
     (guide, blur / rays)

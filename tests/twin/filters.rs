@@ -368,6 +368,7 @@ fn auto_trusts_variances_of_two_samples() {
         (1.0, 0.0, 1.0, 0.5),
         // Squares stay finite: of deviations, and of values 1e23 times the luminance below which errors are absolute.
         (4.0, f32::MAX, 1.0, 0.0),
+        (65536.0, f32::MAX, 1.0, 0.0),
         (4.0, 0.0, 4e20, 0.0),
     ] {
         let mut input = line(&[0.0, value]);

@@ -138,14 +138,14 @@ impl<'a> Layers<'a> {
         // render and its file become the same picture, to the bit.
         let normal = if normal.is_normalized() { normal } else { normal.normalize_or_zero() };
         let (position, depth) = self.places.at(self.aovs, i);
-        let hit = self.aovs.holds(i) && depth > 0.0;
+        let hit = (self.aovs.holds(i) && depth > 0.0) || normal != Vec3::ZERO;
         Guide {
             normal: normal.into(),
             depth,
             position: position.into(),
-            object: if hit || normal != Vec3::ZERO { 0 } else { NONE },
+            object: if hit { 0 } else { NONE },
             albedo: self.albedo(i),
-            material: NONE,
+            material: if hit && self.blur(i) == 0.0 { 0 } else { NONE },
             ..Default::default()
         }
     }

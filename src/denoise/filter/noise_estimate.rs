@@ -7,12 +7,12 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SurfacesPush, vec3, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::noise_estimate::{self, Bind, Constants, MANY, PRIOR};
+use crate::shaders::noise_estimate::{self, Bind, Constants, PRIOR};
 pub use crate::shaders::shared::luminance::ENOUGH;
 use crate::shaders::shared::luminance::STRONGEST;
 use crate::shaders::shared::own_variance;
 use crate::threads::each;
-use glam::Vec3;
+use glam::{FloatExt, Vec3};
 
 /// Pixels from the centre to the border of the window over which the others' variance is taken.
 const REACH: i64 = noise_estimate::REACH as i64;
@@ -68,9 +68,9 @@ pub fn reference(input: &FilterInput, image: &[Packed], edge: &EdgeSettings, cau
     let own: Vec<Option<f32>> = (0..image.len()).map(|at| own_variance(input, at, image[at].count)).collect();
     let variance = |at: usize| match own[at] {
         _ if image[at].count == 0.0 => -1.0,
-        Some(of_pixel) if cautious && image[at].count < MANY => {
-            let (around, known) = (told_around(input, image, &own, at, &rates), image[at].count - 1.0);
-            (PRIOR * around + known * of_pixel) / (PRIOR + known)
+        Some(of_pixel) if cautious => {
+            let (around, freedom) = (told_around(input, image, &own, at, &rates), image[at].count - 1.0);
+            of_pixel.lerp(around, PRIOR / (PRIOR + freedom))
         }
         Some(own) => own,
         None => spread(input, image, at, &rates),

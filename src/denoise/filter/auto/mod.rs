@@ -244,6 +244,7 @@ impl Auto {
             estimate: &self.estimate.plane,
             others: &self.smoothed[2],
             blend: self.blended(),
+            guide: &planes.guide,
             filtered: &planes.output,
         };
         rec.dispatch(&self.residual, bind, &self.push(planes.size), self.residual.groups(threads(planes.size, 1)))
@@ -279,6 +280,8 @@ impl Filter for Auto {
             leverages: &self.leverages,
             blend: self.blended(),
             expected: &self.expected,
+            estimate: &self.estimate.plane,
+            guide: &planes.guide,
         };
         let blend = &self.blend[usize::from(planes.variance.is_some())];
         rec.dispatch_threads(blend, bind, &self.push(planes.size), planes.pixels())?;

@@ -3,8 +3,9 @@ use crate::denoise::filter::FilterInput;
 use crate::denoise::filter::edge::{Rates, edge_weight};
 use crate::denoise::filter::noise_estimate::{contrast, own_variance};
 use crate::denoise::filter::pack::Packed;
-use crate::layout::vec4;
-use crate::shaders::auto_residual::{self, ENOUGH_PIXELS, ENOUGH_SAMPLES, PRIOR_SAMPLES, SIGNIFICANT};
+use crate::layout::{Guide, NONE, vec4};
+use crate::shaders::auto::ENOUGH_TO_DOUBT;
+use crate::shaders::auto_residual::{self, ENOUGH_PIXELS, ENOUGH_SAMPLES, NARROW, PRIOR_SAMPLES, SIGNIFICANT};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// The blend with what it has lost, where samples show that: twin of `auto_residual.comp`. `prior` is the variance of what is lost.
@@ -18,18 +19,25 @@ pub fn given_back(
 ) -> Vec<vec4> {
     let size = [input.width, input.height].map(i64::from);
     let own: Vec<Option<f32>> = (0..image.len()).map(|i| own_variance(input, i, image[i].count)).collect();
+    let doubted = |i: usize| image[i].count >= ENOUGH_TO_DOUBT && !blurred(&input.guide[i]);
     let residual = |i: usize| Residual {
+        blended: blend[i].xyz(),
         colour: image[i].colour - blend[i].xyz(),
         filtered: blend[i].w > 0.0,
-        variance: own[i].unwrap_or(noise[i].max(0.0)),
+        variance: own[i].map_or(noise[i].max(0.0), |own| if doubted(i) { own.max(noise[i]) } else { own }),
+        noise: noise[i].max(own[i].unwrap_or(0.0)).max(0.0),
+        blurred: blurred(&input.guide[i]),
         measured: own[i].is_some(),
     };
     let residuals: Vec<_> = (0..image.len()).map(residual).collect();
-    let restored = |i: usize| -> vec4 {
-        let (given, least) = restored(image, &residuals, size, i, surfaces, prior(i));
-        (blend[i].xyz() + given).max(least).extend(blend[i].w).into()
-    };
+    let restored =
+        |i: usize| -> vec4 { restored(image, &residuals, size, i, surfaces, prior(i)).extend(blend[i].w).into() };
     (0..image.len()).map(restored).collect()
+}
+
+/// As `glsl/shared/blurred.glsl`.
+fn blurred(guide: &Guide) -> bool {
+    guide.material == NONE
 }
 
 /// Sums over the like pixels of a window.
@@ -68,15 +76,42 @@ impl Window {
 
 /// What the blend of a pixel differs by from its samples.
 struct Residual {
+    blended: Vec3,
     colour: Vec3,
     filtered: bool,
-    /// Of the pixel's luminance.
+    /// Of the pixel's luminance, as windows count it.
     variance: f32,
+    /// The larger of what its own samples and like pixels tell of the same.
+    noise: f32,
+    blurred: bool,
     /// By its own samples.
     measured: bool,
 }
 
-/// What a pixel is given back of what the blend has lost, and the least light that it may have.
+/// The range of light that a pixel's blend and those of the other surfaces beside it have.
+struct Edge {
+    own: Vec3,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Edge {
+    /// A neighbour counts as much as it is another surface.
+    fn add(&mut self, blended: Vec3, alike: f32) {
+        let other = blended.lerp(self.own, alike);
+        self.low = self.low.min(other);
+        self.high = self.high.max(other);
+    }
+
+    /// As `at_edge` of the kernel.
+    fn light(&self, light: Vec3, pixel: Vec3, noise: f32) -> Vec3 {
+        let varies = contrast(self.high, self.low).powi(2);
+        let between = pixel.clamp(self.low.min(light), self.high.max(light));
+        if varies > 0.0 { light + varies / (varies + NARROW * noise) * (between - light) } else { light }
+    }
+}
+
+/// The light of a pixel with what it is given back of what the blend has lost.
 fn restored(
     image: &[Packed],
     residuals: &[Residual],
@@ -84,10 +119,12 @@ fn restored(
     at: usize,
     rates: &Rates,
     prior: f32,
-) -> (Vec3, Vec3) {
+) -> Vec3 {
     const REACH: i64 = auto_residual::REACH as i64;
+    let (p, own) = (&image[at], &residuals[at]);
     let (mut windows, mut least, mut known) = ([Window::default(); 3], Vec3::INFINITY, 0);
-    let (p, x, y) = (&image[at], at as i64 % width, at as i64 / width);
+    let (mut edge, x, y) =
+        (Edge { own: own.blended, low: own.blended, high: own.blended }, at as i64 % width, at as i64 / width);
     for (u, v) in (-REACH..=REACH).flat_map(|v| (-REACH..=REACH).map(move |u| (u, v))) {
         if !(0..width).contains(&(x + u)) || !(0..height).contains(&(y + v)) {
             continue;
@@ -100,14 +137,18 @@ fn restored(
         }
         let w = if there.filtered { edge_weight(q, rates.exponent(p, q)) } else { 0.0 };
         let reach = u.abs().max(v.abs());
+        if reach <= 1 && there.filtered && q.count > 0.0 {
+            edge.add(there.blended, w);
+        }
         let holding = windows.iter_mut().zip([REACH, 1, 0]).filter(|(_, most)| reach <= *most);
         holding.for_each(|(window, _)| window.add(there.colour, w, q.count, there.variance));
     }
     least = if known < ENOUGH_PIXELS { least.min(Vec3::ZERO) } else { least };
-    if p.count == 0.0 || !residuals[at].filtered {
-        return (Vec3::ZERO, least);
+    if p.count == 0.0 || !own.filtered {
+        return own.blended.max(least);
     }
-    let used = if residuals[at].measured { 3 } else { 1 };
+    let used = if own.measured { 3 } else { 1 };
     let given = windows[..used].iter().fold(Vec3::ZERO, |given, window| given + window.significant(given, prior));
-    (given, least)
+    let light = (own.blended + given).max(least);
+    if own.blurred { light } else { edge.light(light, p.colour, own.noise) }
 }
