@@ -4,6 +4,7 @@ mod bsdf;
 mod ceilings;
 mod dealt;
 mod denoiser;
+mod edges;
 mod filters;
 mod gloss;
 mod guided;
