@@ -114,8 +114,8 @@ uint choose_light(Receiver r, inout uint word, out float probability) {
 }
 
 // Solid angle in steradians beyond which a lamp does not count as chosen more often: the tree does not choose it so, since all lamps that are
-// as near bring as much. Else lamps that stand on a floor had up to three times the noise there, and a closed box of 12 emitting triangles
-// seven times.
+// as near bring as much. Else lamps that stand on a floor had up to three times the noise there, and a closed box of 12 emitting
+// triangles had seven times as much.
 const float LARGEST_SEEN = 0.25;
 
 // The density per solid angle that MIS takes for a point of a lamp of the tree, which is seen under `solid_angle` from `p` and has this

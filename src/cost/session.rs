@@ -238,7 +238,7 @@ pub fn add_filter(run: &mut Run, render: &WarmUp, filtered: &Timed) -> WarmUp {
 /// Tells all renderers that the scene has changed.
 ///
 /// # Errors
-/// Those of [`Change::add`].
+/// What [`Change::add`] refuses.
 fn tell(warm: &mut [Option<Warm>], change: &Change) -> Result<()> {
     warm.iter_mut().flatten().try_for_each(|warm| warm.missed.add(change.clone()))
 }

@@ -57,7 +57,7 @@ impl FrameResources {
     /// The passes of the last recording, in order, with what they were recorded with; empty if they were not timed.
     ///
     /// # Errors
-    /// As [`Self::times`].
+    /// Those of [`Self::times`], for the same reasons.
     pub fn passes(&self) -> Result<Vec<Pass>> {
         let shapes = self.shapes.iter().cloned();
         Ok(self.times()?.into_iter().zip(shapes).map(|(time, shape)| Pass { time, shape }).collect())

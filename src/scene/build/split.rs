@@ -39,7 +39,7 @@ pub fn depths(lamps: &[u64]) -> Vec<u32> {
 pub struct Lamps<'s> {
     /// A scene of which the pictures are known.
     pub scene: &'s Scene,
-    /// All materials.
+    /// Those of the scene, which does not hold them until its triangles are placed.
     pub materials: &'s [Material],
 }
 

@@ -35,7 +35,7 @@ pub fn given_back(
     (0..image.len()).map(restored).collect()
 }
 
-/// As `glsl/shared/blurred.glsl`.
+/// Whether a lens blurs what the pixel shows, or nothing was hit, as in `glsl/shared/blurred.glsl`.
 fn blurred(guide: &Guide) -> bool {
     guide.material == NONE
 }
