@@ -307,6 +307,13 @@ Light choose_by_share(Receiver r, float u) {
 
 #include "shared/light_tree.glsl"
 
+// Density over area by which MIS takes a lamp to be chosen: by the table, or with a tree as much more often as its part of a picture is brighter
+// than the whole.
+float lamp_density(uint material, float brightness) {
+    float density = push.constants.triangle_pdf_scale * Material_emission_weight(materials, material);
+    return FX_LIGHT_TREE && FX_TEXTURES && brightness > 0.0 ? density * brightness : density;
+}
+
 // Samples one light for a receiver. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(Receiver r, uint word, vec2 u) {
     vec3 p = r.position;
@@ -340,7 +347,7 @@ LightSample light_sample(Receiver r, uint word, vec2 u) {
         sample_environment(index, light.probability, rest, u, s);
     }
     if (FX_LIGHT_TREE && FX_EMISSIVE && s.pdf > 0.0 && (is_triangle_light(light.kind) || is_sphere_light(light.kind))) {
-        float density = push.constants.triangle_pdf_scale * Material_emission_weight(materials, light.material);
+        float density = lamp_density(light.material, FX_TEXTURES ? Shading_brightness(shading, light.triangle) : 0.0);
         s.pdf = nominal_pdf(density, light.probability / s.pdf, p);
     }
     if (FX_LIGHT_TREE && probability == 0.0) s.radiance = vec3(0.0);
@@ -365,7 +372,7 @@ float table_pdf(float density, Surface s, vec3 origin, float t, float cosine) {
 
 // The same, however lights are chosen; with a tree the nominal one.
 float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
-    float density = push.constants.triangle_pdf_scale * Material_emission_weight(materials, s.material);
+    float density = lamp_density(s.material, s.brightness);
     float pdf = table_pdf(density, s, origin, t, cosine);
     if (!FX_LIGHT_TREE || pdf <= 0.0) return pdf;
     float doubled_area;

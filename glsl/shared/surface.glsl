@@ -21,6 +21,7 @@ struct Surface {
     vec3 corner, e1, e2; // the triangle in world space: its first vertex, and the edges from there
     float radius;    // of a sphere, whose centre is `corner`; 0 of a triangle
     float clearance; // distance from the plane at which rays start, world units
+    float brightness; // that of the triangle's record
 };
 
 // Unit vector along `v`, and its length; both 0 where `v` is 0. The largest component is divided out first: the square of a
@@ -100,6 +101,7 @@ Surface sphere_at(Hit hit) {
     s.second_uv = s.uv;
     s.color = vec4(1.0);
     s.tangent = vec4(0.0);
+    s.brightness = 0.0;
     if (SLOPES) perturb(s, Slopes(e1, e2, true));
     return s;
 }
@@ -142,9 +144,11 @@ Surface surface_at(Hit hit) {
     s.uv = s.second_uv = vec2(0.0);
     s.color = vec4(1.0);
     s.tangent = vec4(0.0);
+    s.brightness = 0.0;
     if (!(FX_SMOOTH_NORMALS || FX_VERTEX_COLORS || COORDINATES)) return s;
 
     Shading at = Shading_load(shading, hit.triangle);
+    s.brightness = at.brightness;
     if (FX_SMOOTH_NORMALS && (at.normal.x & at.normal.y & at.normal.z) != 0xffffffffu) {
         vec3 n = mix(octahedral_decode(at.normal.x), octahedral_decode(at.normal.y), hit.b1) +
                  hit.b2 * (octahedral_decode(at.normal.z) - octahedral_decode(at.normal.x));

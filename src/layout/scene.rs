@@ -92,8 +92,8 @@ gpu_structs! {
         attributes: uint,
         /// Index among the texels of the first word of the attributes, which follow each other in the order of their bits.
         first: uint,
-        /// Unused word, which is zero.
-        pad: uint,
+        /// Luminance of a triangle whose emission is a picture, beside the mean of its material, where a tree chooses lights; 0 for others.
+        brightness: float,
     }
 
     /// A placed mesh. 7 texels. Matrices are three rows of four, `x_world = rows * (x_object, 1)`.

@@ -263,6 +263,12 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     LightSample { direction, distance, radiance, pdf: 0.0, sharp: is_sharp(light) }
 }
 
+/// Density over area by which MIS takes a lamp to be chosen.
+fn lamp_density(scene: &Scene, material: u32, brightness: f32) -> f32 {
+    let density = scene.triangle_pdf_scale * scene.materials[material as usize].emission_weight;
+    if scene.has_light_tree() && brightness > 0.0 { density * brightness } else { density }
+}
+
 /// One light for a receiver. Radiance is 0 when the light cannot reach the point.
 pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSample {
     let by_tree = scene.has_light_tree();
@@ -295,7 +301,8 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         _ => sample_environment(scene, &light, rest, u),
     };
     if by_tree && sample.pdf > 0.0 && light.has_surface() {
-        let density = scene.triangle_pdf_scale * scene.materials[light.material as usize].emission_weight;
+        let brightness = scene.shading.get(light.triangle as usize).map_or(0.0, |s| s.brightness);
+        let density = lamp_density(scene, light.material, brightness);
         sample.pdf = nominal_pdf(scene, density, light.probability / sample.pdf, p);
     }
     if by_tree && probability == 0.0 {
@@ -322,7 +329,7 @@ fn table_pdf(scene: &Scene, density: f32, s: &Surface, origin: Vec3, t: f32, cos
 /// The same, however lights are chosen; with a tree the nominal one.
 pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
     let [_, e1, e2] = s.triangle;
-    let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
+    let density = lamp_density(scene, s.material, s.brightness);
     let pdf = table_pdf(scene, density, s, origin, t, cosine);
     if !scene.has_light_tree() || pdf <= 0.0 {
         return pdf;

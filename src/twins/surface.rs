@@ -49,6 +49,8 @@ pub struct Surface {
     pub triangle: [Vec3; 3],
     /// Radius of a sphere, whose centre is the first of `triangle`; 0 for a triangle.
     pub radius: f32,
+    /// [`Shading::brightness`] of its triangle.
+    pub brightness: f32,
     /// Distance from the plane at which rays start, world units.
     pub clearance: f32,
 }
@@ -73,6 +75,7 @@ impl Surface {
             tangent: Vec4::ZERO,
             triangle: [Vec3::ZERO; 3],
             radius: 0.0,
+            brightness: scene.shading.get(hit.triangle as usize).map_or(0.0, |s| s.brightness),
             clearance,
         }
     }

@@ -13,7 +13,7 @@ use tallow::twins::light::*;
 use tallow::twins::light_tree::{brought_by, choose_by_tree};
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 use tallow::twins::scene::triangle_vertices;
-use tallow::twins::surface::surface_at;
+use tallow::twins::surface::{Surface, surface_at, surface_emission};
 use tallow::twins::traverse::{Hit, intersect_triangle, ray_space};
 
 /// From where lights are seen.
@@ -68,15 +68,19 @@ impl Grid {
 fn density(scene: &Loaded, direction: Vec3) -> f64 {
     let sky = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
     let sky = sky.map_or(0.0, |l| environment_radiance(scene, l, direction).1);
+    let pdf = |(s, t): (Surface, f32)| triangle_light_pdf(scene, &s, HERE, t, s.geometric.dot(direction).abs());
+    f64::from(sky) + hit(scene, direction).map(pdf).map(f64::from).sum::<f64>()
+}
+
+/// The lamps in a direction from [`HERE`] that shine there, and how far they are.
+fn hit(scene: &Loaded, direction: Vec3) -> impl Iterator<Item = (Surface, f32)> {
     let ray = ray_space(HERE, direction);
-    let lamp = |i: usize| {
-        let (t, barycentric) = intersect_triangle(&ray, triangle_vertices(scene, i as u32), INFINITE_DISTANCE)?;
-        let s = surface_at(scene, &Hit { t, triangle: i as u32, instance: NONE, barycentric });
-        let cosine = -s.geometric.dot(direction);
+    (0..scene.triangles.len() as u32).filter_map(move |triangle| {
+        let (t, barycentric) = intersect_triangle(&ray, triangle_vertices(scene, triangle), INFINITE_DISTANCE)?;
+        let s = surface_at(scene, &Hit { t, triangle, instance: NONE, barycentric });
         let behind = scene.materials[s.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
-        (cosine > 0.0 || behind).then(|| triangle_light_pdf(scene, &s, HERE, t, cosine.abs()))
-    };
-    f64::from(sky) + (0..scene.triangles.len()).filter_map(lamp).map(f64::from).sum::<f64>()
+        (s.geometric.dot(direction) < 0.0 || behind).then_some((s, t))
+    })
 }
 
 fn samples(scene: &Loaded, count: u32, seed: u32) -> impl Iterator<Item = LightSample> {
@@ -403,25 +407,62 @@ fn moments(scene: &Loaded, independent: bool) -> [f64; 2] {
     [mean, all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 399.0]
 }
 
-/// Light samples of a lamp with a picture beside those of one that is not split, since it may be deformed.
+/// A lamp with one bright patch above [`HERE`], which is not split if it may be deformed.
+fn patch_lamp(moving: bool) -> Loaded {
+    let patch = |x: u32, y: u32| if (8..12).contains(&x) && (3..7).contains(&y) { [255; 3] } else { [30; 3] };
+    Workplace::new().picture("patch.png", 16, patch).scene(&format!(
+        "[[material]]\nname = 'a'\nemission = 9.0\nemission_texture = 'patch.png'\n\
+         [[mesh]]\nname = 'lamp'\nshape = 'rectangle'\nmaterial = 'a'\nmoving = {moving}\n\
+         transform = {{ rotate = [90.0, 0.0, 0.0], translate = [0.1, 1.5, 0.0] }}\n"
+    ))
+}
+
+/// Light samples of a lamp with a picture beside those of one that is not split.
 #[test]
 fn lamps_with_a_picture_are_sampled_where_it_is_bright() {
-    let patch = |x: u32, y: u32| if (8..12).contains(&x) && (3..7).contains(&y) { [255; 3] } else { [30; 3] };
-    let place = Workplace::new().picture("patch.png", 16, patch);
-    let lamp = |moving: bool| {
-        place.scene(&format!(
-            "[[material]]\nname = 'a'\nemission = 9.0\nemission_texture = 'patch.png'\n\
-             [[mesh]]\nname = 'lamp'\nshape = 'rectangle'\nmaterial = 'a'\nmoving = {moving}\n\
-             transform = {{ rotate = [90.0, 0.0, 0.0], translate = [0.1, 1.5, 0.0] }}\n"
-        ))
-    };
-    let (split, whole) = (lamp(false), lamp(true));
+    let (split, whole) = (patch_lamp(false), patch_lamp(true));
     assert_eq!(whole.lights.len(), 2);
     let ([mean, noise], [expected, noise_of_whole]) = (moments(&split, true), moments(&whole, true));
     let error = ((noise + noise_of_whole) / 400.0).sqrt();
     assert!((mean - expected).abs() < 4.0 * error, "{mean}, not {expected}, to {error}");
     println!("{} lamps: {:.3} of the variance", split.lights.len(), noise / noise_of_whole);
     assert!(noise < 0.1 * noise_of_whole, "{noise}, {noise_of_whole}");
+}
+
+/// Of the irradiance of a floor at [`HERE`] that MIS with a bounce by the cosine gives, what light samples bring and what bounces do.
+fn shares(scene: &Loaded) -> [f64; 2] {
+    let weighed = |own: f32, other: f32| f64::from(own / (own + other).max(1e-30));
+    let sampled = |s: LightSample| {
+        let cosine = s.direction.y.max(0.0);
+        f64::from(s.radiance.x * cosine) * weighed(s.pdf, cosine / PI as f32)
+    };
+    let by_light = samples(scene, 100_000, 3).map(sampled).sum::<f64>() / 1e5;
+    let met = |(_, direction, area): (usize, Vec3, f64)| {
+        let cosine = direction.y.max(0.0);
+        let (s, t) = hit(scene, direction).next()?;
+        let pdf = triangle_light_pdf(scene, &s, HERE, t, -s.geometric.dot(direction));
+        let radiance = f64::from(surface_emission(scene, &s).x);
+        Some(radiance * f64::from(cosine) * weighed(cosine / PI as f32, pdf) * area)
+    };
+    let grid = Grid { world_from_sky: Mat3::IDENTITY };
+    [by_light, grid.directions().filter_map(met).sum()]
+}
+
+/// Parts of a picture count for MIS as often as they are chosen, and for rays and light samples alike.
+#[test]
+fn mis_leaves_the_bright_part_of_a_picture_to_light_samples() {
+    let scene = patch_lamp(false);
+    let mut by_mean = scene.clone();
+    by_mean.scene.shading.iter_mut().for_each(|s| s.brightness = 0.0);
+    let [parts, mean] = [&scene, &by_mean].map(shares);
+    println!(
+        "light samples bring {:.3}, by the mean {:.3}",
+        parts[0] / (parts[0] + parts[1]),
+        mean[0] / (mean[0] + mean[1])
+    );
+    let [all, expected] = [parts, mean].map(|[light, bounce]| light + bounce);
+    assert!((all / expected - 1.0).abs() < 0.01, "{all}, not {expected}");
+    assert!(parts[1] < 0.7 * mean[1], "{parts:?}, {mean:?}");
 }
 
 #[test]

@@ -36,6 +36,7 @@ pub struct Args {
         long,
         value_name = "LIST",
         value_delimiter = ',',
+        conflicts_with = "filter_only",
         default_value = "uniform,both",
         default_value_if("ablate", "true", "both")
     )]
@@ -54,12 +55,13 @@ pub struct Args {
         long,
         value_name = "LIST",
         value_delimiter = ',',
+        conflicts_with = "filter_only",
         default_value = "1,2,4,8,16",
         default_value_if("ablate", "true", "4")
     )]
     pub spp: Vec<u32>,
     /// Rounds of policies that learn; 0 is their own choice
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "0")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with = "filter_only", default_value = "0")]
     pub rounds: Vec<u32>,
     /// Where the scene moves: whether frames begin with samples of the last [default: off,forward where the camera has no lens]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', conflicts_with = "filter_only")]
@@ -69,7 +71,7 @@ pub struct Args {
     #[arg(long, value_name = "N", conflicts_with = "filter_only", value_parser = clap::value_parser!(u32).range(1..))]
     pub frame: Option<u32>,
     /// Where the scene moves: frames per second, such as 24 or 30000/1001
-    #[arg(long, default_value = "24", value_parser = frames_per_second)]
+    #[arg(long, conflicts_with = "filter_only", default_value = "24", value_parser = frames_per_second)]
     pub fps: f64,
     /// Options of tallow render or tallow sequence and settings of tallow filter for all points, and of the render for the reference
     /// too, such as "--max-depth 4"; with --filter-only of tallow filter alone
@@ -80,7 +82,7 @@ pub struct Args {
     pub variants: Vec<String>,
     /// Measure everything also with each other value of every knob that it has: what it takes in time, and gives in error [grid:
     /// both + auto, 4 spp, if no lists are given]
-    #[arg(long)]
+    #[arg(long, conflicts_with = "filter_only")]
     pub ablate: bool,
     /// Points of other renderers to put beside: a .csv with the columns method, filter, spp, seed, ms (wall time) and image (a file)
     #[arg(long, value_name = "FILE", conflicts_with = "filter_only")]
@@ -97,7 +99,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
     /// Most samples per pixel of a reference that is rendered; a measurement that goes on keeps the reference that it began with
-    #[arg(long, value_name = "N", default_value = "4096", value_parser = clap::value_parser!(u32).range(64..=1 << 24))]
+    #[arg(long, value_name = "N", conflicts_with = "filter_only", default_value = "4096", value_parser = clap::value_parser!(u32).range(64..=1 << 24))]
     pub reference_spp: u32,
     /// Chooses the random order of the runs
     #[arg(long, value_name = "N", default_value = "0")]

@@ -38,9 +38,19 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     let points = |lights: &[Light]| lights.iter().filter(|l| l.is_point_or_spot()).count();
     scene.weighed_lights = points(&scene.rig.lights) > 1 && points(&scene.lights) <= MOST_WEIGHED;
     if scene.lights.iter().filter(|l| is_in_tree(scene, l)).count() > MOST_BY_POWER {
+        tell_brightness(scene);
         scene.light_nodes = tree(scene);
     }
     Ok(())
+}
+
+/// Sets [`Shading::brightness`], which stays: any is right for MIS that rays and light samples find alike.
+fn tell_brightness(scene: &mut Scene) {
+    let has_picture =
+        |light: &&Light| light.is_triangle() && scene.materials[light.material as usize].emission_texture != NONE;
+    let told = |light: &Light| (light.triangle as usize, brightness(scene, light) as f32);
+    let all: Vec<_> = scene.lights.par_iter().filter(has_picture).map(told).collect();
+    all.into_iter().for_each(|(triangle, brightness)| scene.shading[triangle].brightness = brightness);
 }
 
 /// Sets [`Material::emission_weight`] of all materials, and finds the triangles that emit.
