@@ -25,6 +25,7 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/whole_pixel.glsl"
 #include "shared/probe_cell.glsl"
 #include "shared/held.glsl"
+#include "shared/rests.glsl"
 
 // Steps towards where a point was on the last film. Where nothing but the camera moves the first place is exact.
 const int STEPS = 4;
@@ -59,6 +60,18 @@ void merge(inout Merged m, uint from, Carried c, float weight) {
     m.c.age = max(m.c.age, c.age + 1u);
 }
 
+// The word of what was merged, whose statistics become those of so many samples of equal weight.
+uint finish(inout Merged m, bool edge) {
+    m.c.count = min(uint(m.samples / m.weight + 0.5), MOST_CARRIED);
+    m.c.edge = edge;
+    // Of single samples beside one that nearly all is of, the difference would be rounding.
+    float variance = freedom(m.c.count) / max(m.samples - m.squares / m.samples, 1e-4 * m.samples);
+    m.stats.count = m.c.count;
+    m.stats.m2 = min(m.stats.m2 * variance, MOST_M2);
+    m.light.indirect_m2 = min(m.light.indirect_m2 * variance, MOST_M2);
+    return word_of(m.c);
+}
+
 // Where on the last film the point was that a pixel shows now; z as of film_from_point. What the pixels of the last frame show has
 // moved from their centres to where it is now: a point between them has moved by as much.
 vec3 was_at(Surface s, vec2 centre) {
@@ -80,11 +93,8 @@ uint reason_to_leave(uint pixel, uint from, bool edge, float view, inout Carried
     if (c.edge != edge) return DROPPED_HIDDEN;
     Surface s = surface_of(History_triangle(history, from), History_instance(history, from), History_weights(history, from));
     if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0) || !shows(pixel, s)) return DROPPED_HIDDEN;
-    if (push.moved != 0u) {
-        float light = LightChange_change(changes, probe_cell_of(from, push.size)) / max(push.noise, 1e-15);
-        c.count = worth(c.count, light * light);
-        if (c.count == 0u) return DROPPED_LIGHT;
-    }
+    c.count = worth_in_light(c.count, from);
+    if (c.count == 0u) return DROPPED_LIGHT;
     c.count = worth_in_view(c.count, view, from);
     if (c.count == 0u) return DROPPED_VIEW;
     c.count = shared_out(c.count, s.position);
@@ -98,6 +108,13 @@ uint take(uint pixel, inout Merged m) {
     Surface s = surface_of(p);
     ivec2 size = ivec2(push.size);
     bool edge = !is_whole(pixel, s.geometric, pixel_width(camera, push.size));
+    Carried rests = resting(pixel, texelFetch(offered, int(pixel)).x, edge);
+    if (rests.count > 0u) {
+        rests.count = worth_in_light(rests.count, pixel);
+        if (rests.count == 0u) return dropped(DROPPED_LIGHT);
+        merge(m, pixel, rests, 1.0);
+        return finish(m, edge);
+    }
     vec3 film = was_at(s, vec2(pixel % push.size.x, pixel / push.size.x) + 0.5);
     if (!(film.z > 0.0 && finite(film))) return dropped(DROPPED_OUTSIDE);
     vec2 at = clamp(film.xy, vec2(-2.0), vec2(size) + 2.0) - 0.5, low = floor(at);
@@ -114,15 +131,7 @@ uint take(uint pixel, inout Merged m) {
         if (why == 0u && c.count > 0u && weight > 0.0) merge(m, from, c, weight);
         if (reason != 0u) reason = why;
     }
-    if (m.weight == 0.0) return dropped(edge ? DROPPED_EDGE : reason);
-    m.c.count = min(uint(m.samples / m.weight + 0.5), MOST_CARRIED);
-    m.c.edge = edge;
-    // Of single samples beside one that nearly all is of, the difference would be rounding.
-    float variance = freedom(m.c.count) / max(m.samples - m.squares / m.samples, 1e-4 * m.samples);
-    m.stats.count = m.c.count;
-    m.stats.m2 = min(m.stats.m2 * variance, MOST_M2);
-    m.light.indirect_m2 = min(m.light.indirect_m2 * variance, MOST_M2);
-    return word_of(m.c);
+    return m.weight == 0.0 ? dropped(edge ? DROPPED_EDGE : reason) : finish(m, edge);
 }
 
 void main() {

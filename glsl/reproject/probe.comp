@@ -36,6 +36,11 @@ vec3 light_around(uint pixel, uvec2 film) {
     return sum / 9.0;
 }
 
+bool hands_on(uint pixel) {
+    uint word = texelFetch(offered, int(pixel)).x;
+    return carried_of(word).count > 0u || (word != 0u && carried_of(History_resting(history, pixel)).count > 0u);
+}
+
 // One of the cell's pixels that hand on samples, the first from a random one on; NONE where none does.
 uint chosen_pixel(uint cell) {
     uvec2 size = push.constants.size, cells = probe_cells_of(size);
@@ -45,7 +50,7 @@ uint chosen_pixel(uint cell) {
         uint place = (first + k) % (PROBE_CELL * PROBE_CELL);
         uvec2 at = corner + uvec2(place % PROBE_CELL, place / PROBE_CELL);
         uint pixel = at.y * size.x + at.x;
-        if (all(lessThan(at, size)) && carried_of(texelFetch(offered, int(pixel)).x).count > 0u) chosen = pixel;
+        if (all(lessThan(at, size)) && hands_on(pixel)) chosen = pixel;
     }
     return chosen;
 }

@@ -29,6 +29,8 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/history.glsl"
 #include "shared/probe_cell.glsl"
 #include "shared/held.glsl"
+#include "shared/whole_pixel.glsl"
+#include "shared/rests.glsl"
 
 // Offers the samples of a pixel to those around `film`, a point of the film, of an edge to edges alone. Returns why none takes them,
 // or 0.
@@ -54,11 +56,8 @@ uint offer(uint pixel, Surface s, vec2 film, bool edge, bool few) {
 uint moved(uint pixel, Carried c) {
     Surface s = surface_of(History_triangle(history, pixel), History_instance(history, pixel), History_weights(history, pixel));
     if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0)) return dropped(DROPPED_HIDDEN);
-    if (push.moved != 0u) {
-        float light = LightChange_change(changes, probe_cell_of(pixel, push.size)) / max(push.noise, 1e-15);
-        c.count = worth(c.count, light * light);
-        if (c.count == 0u) return dropped(DROPPED_LIGHT);
-    }
+    c.count = worth_in_light(c.count, pixel);
+    if (c.count == 0u) return dropped(DROPPED_LIGHT);
     c.count = worth_in_view(c.count, view_change(s), pixel);
     if (c.count == 0u) return dropped(DROPPED_VIEW);
     c.count = shared_out(c.count, s.position);
@@ -67,12 +66,24 @@ uint moved(uint pixel, Carried c) {
     return reason == 0u ? word_of(Carried(c.count, c.age + 1u, c.edge, c.back)) : dropped(reason);
 }
 
+// Leaves the samples of a pixel that rests where they are. Returns their word, or why they go.
+uint kept(uint pixel, Carried c) {
+    c.count = worth_in_light(c.count, pixel);
+    if (c.count == 0u) return dropped(DROPPED_LIGHT);
+    atomicMin(winner[pixel], (c.edge ? AT_EDGE : 0u) | pixel); // at no distance from the centre
+    return word_of(Carried(c.count, c.age + 1u, c.edge, c.back));
+}
+
 void main() {
     uint i = thread_index();
     if (i >= push.pixels) return;
     uint pixel = push.first_pixel + i;
     Carried c = carried_of(offered[pixel]);
-    if (c.count == 0u) return;
-    if (push.moved == 0u && previous == camera) winner[pixel] = pixel;
-    else offered[pixel] = moved(pixel, c);
+    if (push.moved == 0u && previous == camera) {
+        if (c.count > 0u) winner[pixel] = pixel;
+        return;
+    }
+    Carried resting = resting(pixel, offered[pixel], (winner[pixel] & AT_EDGE) != 0u);
+    if (resting.count > 0u) offered[pixel] = kept(pixel, resting);
+    else if (c.count > 0u) offered[pixel] = moved(pixel, c);
 }

@@ -116,14 +116,16 @@ uint kept_by_spread(uint pixel, vec3 plane, uint count, bool edge, out float noi
     return degrees > 0.0 ? worth(count, (edge ? SHARE_AT_EDGE : SHARE_OF_SPREAD) * beyond / max(variance - beyond, 1e-30)) : count;
 }
 
-// 0 where the pixel's samples may move: so many, of that side of the surface, of an edge or not.
-uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c, out float noise) {
+// 0 where the pixel's samples may move: so many, of that side of the surface, of an edge or not. Where they do not have to, all rest.
+uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c, out float noise, out uint resting) {
     noise = UNKNOWN_NOISE;
+    resting = 0u;
     if (at.triangle == NONE) return DROPPED_SKY;
     Surface s = surface_of(at);
     c.back = dot(s.geometric, previous.position - s.position) < 0.0;
     if (is_sharp(surface_bsdf(s))) return DROPPED_SPECULAR;
     c.edge = !is_whole(pixel, s.geometric, pixel_width(previous, push.size));
+    resting = word_of(c);
     c.count = min(kept_by_spread(pixel, s.geometric, c.count, c.edge, noise), kept_of_edge(pixel, s.geometric, c.count, c.edge));
     return c.count > 0u ? 0u : DROPPED_EDGE;
 }
@@ -160,7 +162,8 @@ void main() {
     c = older(c, s.count, still);
     c.edge = c.back = false;
     float noise = UNKNOWN_NOISE;
-    uint reason = still || s.count == 0u ? 0u : c.count == 0u ? DROPPED_OLD : reason_to_keep(pixel, at, c, noise);
+    uint resting = 0u;
+    uint reason = still || s.count == 0u ? 0u : c.count == 0u ? DROPPED_OLD : reason_to_keep(pixel, at, c, noise, resting);
     offered[i] = reason == 0u ? word_of(c) : dropped(reason);
     at = numbered_anew(at);
     // Where nothing moves sums are handed on as they are, but for samples that MOST_CARRIED leaves out.
@@ -172,6 +175,7 @@ void main() {
     h.mean = s.mean;
     h.variance = s.m2 * share / divisor;
     h.noise = noise;
+    h.resting = resting;
     history[i] = History_words(h);
     if (FX_SPLIT) {
         PixelLight l = PixelLight_load(light, pixel);

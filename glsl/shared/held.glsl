@@ -1,5 +1,5 @@
-// Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, and before them `previous`,
-// `guide` (of the new frame), `history` and `push` (ReprojectPush).
+// Whether samples still hold in a new frame. Needs surface_point.glsl, history.glsl, probe_cell.glsl, and before them `previous`,
+// `guide` (of the new frame), `history`, `changes` and `push` (ReprojectPush).
 #include "shared/largest_channel.glsl"
 
 // A hit is of the surface of a point if it lies no farther from the plane there than this, in widths of a pixel.
@@ -41,6 +41,13 @@ float view_change(Surface s) {
 // How many of `count` samples of a pixel of the last frame are worth handing on after that change, beside their noise.
 uint worth_in_view(uint count, float change, uint pixel) {
     return worth(count, change / max(push.view * push.view * History_noise(history, pixel), 1e-30));
+}
+
+// How many of `count` samples of a pixel of the last frame are worth handing on after light has changed, where more than the camera has.
+uint worth_in_light(uint count, uint pixel) {
+    if (push.moved == 0u) return count;
+    float light = LightChange_change(changes, probe_cell_of(pixel, push.size)) / max(push.noise, 1e-15);
+    return worth(count, light * light);
 }
 
 // Of samples that several new pixels take, because each of them is smaller at the point than the old one was, a share each: filters take

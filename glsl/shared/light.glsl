@@ -307,8 +307,8 @@ Light choose_by_share(Receiver r, float u) {
 
 #include "shared/light_tree.glsl"
 
-// Density over area by which MIS takes a lamp to be chosen: by the table, or with a tree as much more often as its part of a picture is brighter
-// than the whole.
+// Density over area by which MIS takes a lamp to be chosen: by the table, or with a tree as much more often as its part of a picture is
+// brighter than the whole.
 float lamp_density(uint material, float brightness) {
     float density = push.constants.triangle_pdf_scale * Material_emission_weight(materials, material);
     return FX_LIGHT_TREE && FX_TEXTURES && brightness > 0.0 ? density * brightness : density;

@@ -30,8 +30,8 @@ gpu_structs! {
         /// Variance of one sample of the pixels around, sum of the channels, as a share of the square of their mean radiance: 1e15 where
         /// it is unknown, or not asked for.
         noise: float,
-        /// Unused.
-        pad: uint,
+        /// What the pixel keeps if neither the camera nor anything that it shows moves, as a word of `glsl/shared/history.glsl`; or 0.
+        resting: uint,
     }
 
     /// The light of a [`History`], where direct and indirect light are kept apart. 2 texels.

@@ -135,6 +135,15 @@ impl Reprojection<'_> {
         let s = surface_of(self.scene, at.triangle, at.instance, at.weights);
         let edge = !self.is_whole(guide, pixel, s.geometric, pixel_width(&self.camera, self.push.size));
         let here = vec2((pixel as i32 % size.x) as f32, (pixel as i32 / size.x) as f32) + 0.5;
+        if let Some(mut c) = self.resting(handed, guide, pixel, edge) {
+            c.count = self.after_change(pixel, c.count);
+            if c.count == 0 {
+                return Err(dropped(DROPPED_LIGHT));
+            }
+            let mut merged = Merged::default();
+            merged.add(handed, pixel, c, 1.0);
+            return Ok(merged.finish(edge));
+        }
         let film = self.was_at(handed, &s, here);
         if !(film.z > 0.0 && film.is_finite()) {
             return Err(dropped(DROPPED_OUTSIDE));

@@ -26,7 +26,7 @@ fn sample_of(cell: u32, size: [u32; 2]) -> u32 {
 }
 
 /// The pixel whose point a cell's path starts at, or [`NONE`].
-pub fn chosen_pixel(cell: u32, size: [u32; 2], seed: u32, offered: &[u32]) -> u32 {
+pub fn chosen_pixel(cell: u32, size: [u32; 2], seed: u32, hands_on: impl Fn(u32) -> bool) -> u32 {
     let across = probe_cells_of(size)[0];
     let (x, y) = (PROBE_CELL * (cell % across), PROBE_CELL * (cell / across));
     let first = pcg(cell.wrapping_add(pcg(seed)));
@@ -35,14 +35,22 @@ pub fn chosen_pixel(cell: u32, size: [u32; 2], seed: u32, offered: &[u32]) -> u3
         .map(|place| [x + place % PROBE_CELL, y + place / PROBE_CELL])
         .filter(|at| at[0] < size[0] && at[1] < size[1]);
     let mut pixels = pixels.map(|[x, y]| y * size[0] + x);
-    pixels.find(|&pixel| Carried::of(offered[pixel as usize]).count > 0).unwrap_or(NONE)
+    pixels.find(|&pixel| hands_on(pixel)).unwrap_or(NONE)
 }
 
+/// What every pixel hands on: the word, and what it keeps if it rests.
+type HandedOn<'a> = (&'a [u32], &'a [History]);
+
 /// Paths of all cells before the scene changes. The tracer's seed is that of the probes.
-pub fn before(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], offered: &[u32]) -> Vec<Probe> {
+pub fn before(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], (offered, records): HandedOn) -> Vec<Probe> {
     let (size, seed) = (tracer.frame.path.size, tracer.frame.path.seed);
     let [across, down] = probe_cells_of(size);
-    let probe = |cell| match chosen_pixel(cell, size, seed, offered) {
+    let counts = |word: u32| Carried::of(word).count > 0;
+    let hands_on = |pixel: u32| {
+        let (word, resting) = (offered[pixel as usize], records[pixel as usize].resting);
+        counts(word) || word != 0 && counts(resting)
+    };
+    let probe = |cell| match chosen_pixel(cell, size, seed, hands_on) {
         NONE => Probe { pixel: NONE, ..Probe::default() },
         pixel => {
             let light = tracer.light_from(points[pixel as usize], eye.position.into(), sample_of(cell, size)).into();

@@ -11,6 +11,7 @@ use crate::shaders::remember::{
 };
 use crate::shaders::shared::held::PLANE_DISTANCE;
 use crate::shaders::shared::history::*;
+use crate::shaders::shared::rests::AT_REST;
 use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
 use crate::twins::light_change::{probe_cell_of, square};
@@ -188,7 +189,7 @@ impl Reprojection<'_> {
     }
 
     /// Why a pixel keeps its samples, or 0: what moves of them is in `c`.
-    fn reason_to_keep(&self, left: &Left, pixel: usize, c: &mut Carried, noise: &mut f32) -> u32 {
+    fn reason_to_keep(&self, left: &Left, pixel: usize, c: &mut Carried, noise: &mut f32, resting: &mut u32) -> u32 {
         let at = left.points[pixel];
         if at.triangle == NONE {
             return DROPPED_SKY;
@@ -200,6 +201,7 @@ impl Reprojection<'_> {
         }
         c.edge = !self.is_whole(left.guide, pixel, s.geometric, pixel_width(&self.previous, self.push.size));
         *noise = self.noise_around(left, pixel, s.geometric, c.edge);
+        *resting = c.word();
         let worth = self.kept_by_spread(left, pixel, s.geometric, c.count, c.edge);
         c.count = match c.edge {
             true => self.kept_of_edge(left, pixel, s.geometric, c.count).min(worth),
@@ -226,11 +228,11 @@ impl Reprojection<'_> {
             let still = self.still();
             let before = Some(Carried::of(left.carried[pixel])).filter(|c| c.count > 0).unwrap_or_default();
             let mut now = self.older(before, s.count);
-            let mut noise = UNKNOWN_NOISE;
+            let (mut noise, mut resting) = (UNKNOWN_NOISE, 0);
             let reason = match (still || s.count == 0, now.count) {
                 (true, _) => 0,
                 (false, 0) => DROPPED_OLD,
-                (false, _) => self.reason_to_keep(left, pixel, &mut now, &mut noise),
+                (false, _) => self.reason_to_keep(left, pixel, &mut now, &mut noise, &mut resting),
             };
             handed.offered.push(if reason == 0 { now.word() } else { dropped(reason) });
             let share = if still { freedom(now.count) / freedom(s.count) } else { 1.0 };
@@ -238,7 +240,7 @@ impl Reprojection<'_> {
             let variance = s.m2.map(of_one);
             let SurfacePoint { triangle, instance, weights, .. } = self.numbered_anew(at);
             let mean = s.mean;
-            handed.records.push(History { triangle, instance, weights, mean, variance, noise, ..Default::default() });
+            handed.records.push(History { triangle, instance, weights, mean, variance, noise, resting });
             let (direct, albedo, indirect_variance) = (l.direct, l.albedo, of_one(l.indirect_m2));
             handed.light.push(HistoryLight { direct, albedo, indirect_variance, ..Default::default() });
         }
@@ -349,6 +351,39 @@ impl Reprojection<'_> {
         if reason == 0 { word } else { dropped(reason) }
     }
 
+    fn point_rests(&self, handed: &Handed, guide: &[Guide], pixel: usize) -> bool {
+        let (h, width) = (&handed.records[pixel], self.push.size[0] as usize);
+        if h.triangle == NONE {
+            return guide[pixel].object == NONE;
+        }
+        let s = surface_of(self.scene, h.triangle, h.instance, h.weights);
+        let film = film_from_point(&self.camera, s.position, self.push.size);
+        let off = film.truncate() - vec2((pixel % width) as f32, (pixel / width) as f32) - 0.5;
+        film.z > 0.0 && off.abs().max_element() <= AT_REST && self.shows(&guide[pixel], &s)
+    }
+
+    /// The samples that a pixel keeps as they are, which is at an edge in the new frame or not.
+    pub(super) fn resting(&self, handed: &Handed, guide: &[Guide], pixel: usize, edge: bool) -> Option<Carried> {
+        let c = Carried::of(handed.records[pixel].resting);
+        let seen = || square(pixel, self.push.size).filter(|&q| edge || q == pixel);
+        let rests = handed.offered[pixel] != 0
+            && self.previous == self.camera
+            && c.count > 0
+            && c.edge == edge
+            && seen().all(|q| self.point_rests(handed, guide, q));
+        rests.then_some(c)
+    }
+
+    /// Leaves the samples of a pixel that rests where they are.
+    fn kept(&self, winner: &mut [u32], pixel: usize, mut c: Carried) -> u32 {
+        c.count = self.after_change(pixel, c.count);
+        if c.count == 0 {
+            return dropped(DROPPED_LIGHT);
+        }
+        winner[pixel] = winner[pixel].min(if c.edge { AT_EDGE } else { 0 } | pixel as u32);
+        Carried { age: c.age + 1, ..c }.word()
+    }
+
     /// Twin of `edges.comp`: a key without an offer of every new pixel. `guide` and `points` are those of the new frame.
     fn edges(&self, guide: &[Guide], points: &[SurfacePoint]) -> Vec<u32> {
         let width = pixel_width(&self.camera, self.push.size);
@@ -362,10 +397,16 @@ impl Reprojection<'_> {
         let mut winner = self.edges(guide, points);
         for pixel in 0..guide.len() {
             let c = Carried::of(handed.offered[pixel]);
-            match c.count {
-                0 => {}
-                _ if self.still() => winner[pixel] = pixel as u32,
-                _ => handed.offered[pixel] = self.moved(handed, guide, &mut winner, pixel, c),
+            if self.still() {
+                if c.count > 0 {
+                    winner[pixel] = pixel as u32;
+                }
+                continue;
+            }
+            match self.resting(handed, guide, pixel, winner[pixel] & AT_EDGE != 0) {
+                Some(c) => handed.offered[pixel] = self.kept(&mut winner, pixel, c),
+                None if c.count > 0 => handed.offered[pixel] = self.moved(handed, guide, &mut winner, pixel, c),
+                None => {}
             }
         }
         winner

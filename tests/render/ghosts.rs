@@ -168,6 +168,44 @@ fn what_brings_no_change_drops_nothing() {
     assert_silent(&gpu);
 }
 
+/// A chequered wall and a block before it, which fill the view, and a small cube that moves.
+fn chequered() -> Loaded {
+    let squares = |x: u32, y: u32| if (x + y) % 2 == 0 { [230; 3] } else { [20; 3] };
+    let mut scene = Workplace::new().picture("squares.png", 16, squares).scene(
+        "[camera]\nposition = [0.3, 0.2, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n\
+         [[material]]\nname = 'squares'\ncolor_texture = 'squares.png'\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'squares'\ntransform = { scale = 6.0, translate = [0.0, 0.0, -1.0] }\n\
+         [[mesh]]\nshape = 'cube'\nmaterial = 'squares'\ntransform = { scale = 0.6, rotate = [0.0, 30.0, 20.0] }\n\
+         [[mesh]]\nname = 'cube'\nshape = 'cube'\n\
+         [[instance]]\nname = 'sign'\nmesh = 'cube'\ntransform = { scale = 0.25, translate = [-1.6, 0.0, 0.0] }\n",
+    );
+    (scene.settings.width, scene.settings.height, scene.settings.spp) = (65, 49, 1);
+    scene
+}
+
+/// Before a camera at rest, pixels whose surfaces rest keep every sample, also where textures and edges make neighbours differ.
+#[test]
+fn what_rests_keeps_all_its_samples_while_something_moves() {
+    let gpu = gpu();
+    let frames = 4;
+    for way in WAYS {
+        let mut scene = chequered();
+        let mut film = Film::moving(&gpu, &scene, Reproject { reproject_light: 1e9, ..by(way) });
+        film.frame(film.camera);
+        for k in 1..=frames {
+            let pose = moved(&scene, "sign", -1.6 + 0.02 * f64::from(k), 0.0, 0.0);
+            let change = scene.apply(&pose).unwrap();
+            film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+            film.frame(film.camera);
+        }
+        let counts: Vec<u32> = film.stats().iter().map(|s| s.count).collect();
+        let all = counts.iter().filter(|&&n| n == frames + 1).count();
+        println!("{way:?}: {all} of {} pixels keep all", counts.len());
+        assert!(all * 20 > counts.len() * 19 && all < counts.len(), "{way:?}: {all} of {}", counts.len());
+    }
+    assert_silent(&gpu);
+}
+
 /// Sunlight on a floor, and a bulb in the shade of a slab.
 fn shade() -> Loaded {
     let mut scene = Workplace::new().scene(
