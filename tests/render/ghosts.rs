@@ -171,8 +171,8 @@ fn what_brings_no_change_drops_nothing() {
 /// A chequered wall and a block before it, which fill the view, and a small cube that moves.
 fn chequered() -> Loaded {
     let squares = |x: u32, y: u32| if (x + y) % 2 == 0 { [230; 3] } else { [20; 3] };
-    let mut scene = Workplace::new().picture("squares.png", 16, squares).scene(
-        "[camera]\nposition = [0.3, 0.2, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n\
+    let mut scene = Workplace::new().picture("squares.png", 64, squares).scene(
+        "[camera]\nposition = [0.3, 0.2, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n[environment]\nradiance = 1.0\n\
          [[material]]\nname = 'squares'\ncolor_texture = 'squares.png'\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'squares'\ntransform = { scale = 6.0, translate = [0.0, 0.0, -1.0] }\n\
          [[mesh]]\nshape = 'cube'\nmaterial = 'squares'\ntransform = { scale = 0.6, rotate = [0.0, 30.0, 20.0] }\n\
