@@ -170,7 +170,7 @@ fn what_brings_no_change_drops_nothing() {
 
 /// A chequered wall and a block before it, which fill the view, and a small cube that moves.
 fn chequered() -> Loaded {
-    let squares = |x: u32, y: u32| if (x + y) % 2 == 0 { [230; 3] } else { [20; 3] };
+    let squares = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [230; 3] } else { [20; 3] };
     let mut scene = Workplace::new().picture("squares.png", 64, squares).scene(
         "[camera]\nposition = [0.3, 0.2, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n[environment]\nradiance = 1.0\n\
          [[material]]\nname = 'squares'\ncolor_texture = 'squares.png'\n\
