@@ -49,7 +49,7 @@ pub struct Surface {
     pub triangle: [Vec3; 3],
     /// Radius of a sphere, whose centre is the first of `triangle`; 0 for a triangle.
     pub radius: f32,
-    /// [`Shading::brightness`] of its triangle.
+    /// [`Shading::brightness`](crate::layout::Shading::brightness) of its triangle.
     pub brightness: f32,
     /// Distance from the plane at which rays start, world units.
     pub clearance: f32,
