@@ -3,14 +3,17 @@
 // Points that are seen this near to where they were rest, in widths of a pixel: for rounding.
 const float AT_REST = 0.03125;
 
-// Whether the pixel's point is seen through its centre, where points begin, and still is what is seen there.
+// Whether the pixel's point is seen through its centre, where points begin, from the side that its samples are of, and still is what is
+// seen there.
 bool point_rests(uint pixel) {
     uint triangle = History_triangle(history, pixel);
     if (triangle == NONE) return Guide_object(guide, pixel) == NONE;
     Surface s = surface_of(triangle, History_instance(history, pixel), History_weights(history, pixel));
+    Carried c = carried_of(History_resting(history, pixel));
+    bool same_side = c.count == 0u || c.back == (dot(s.geometric, camera.position - s.position) < 0.0);
     vec3 film = film_from_point(camera, s.position, push.size);
     vec2 off = abs(film.xy - vec2(pixel % push.size.x, pixel / push.size.x) - 0.5);
-    return film.z > 0.0 && max(off.x, off.y) <= AT_REST && shows(pixel, s);
+    return same_side && film.z > 0.0 && max(off.x, off.y) <= AT_REST && shows(pixel, s);
 }
 
 // The samples that a pixel keeps as they are, which is at an edge in the new frame or not: none unless its point rests, and at an edge

@@ -359,7 +359,11 @@ impl Reprojection<'_> {
         let s = surface_of(self.scene, h.triangle, h.instance, h.weights);
         let film = film_from_point(&self.camera, s.position, self.push.size);
         let off = film.truncate() - vec2((pixel % width) as f32, (pixel / width) as f32) - 0.5;
-        film.z > 0.0 && off.abs().max_element() <= AT_REST && self.shows(&guide[pixel], &s)
+        let (c, back) = (Carried::of(h.resting), s.geometric.dot(Vec3::from(self.camera.position) - s.position) < 0.0);
+        (c.count == 0 || c.back == back)
+            && film.z > 0.0
+            && off.abs().max_element() <= AT_REST
+            && self.shows(&guide[pixel], &s)
     }
 
     /// The samples that a pixel keeps as they are, which is at an edge in the new frame or not.

@@ -206,6 +206,31 @@ fn what_rests_keeps_all_its_samples_while_something_moves() {
     assert_silent(&gpu);
 }
 
+/// A card that is mirrored about its own plane lies where it was and shows its other side.
+#[test]
+fn what_turns_over_in_its_place_keeps_nothing() {
+    let gpu = gpu();
+    for way in WAYS {
+        let mut scene = Workplace::new().scene(
+            "[camera]\nposition = [0.0, 0.0, 3.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n[environment]\nradiance = 1.0\n\
+             [[mesh]]\nname = 'card'\nshape = 'rectangle'\n[[instance]]\nname = 'card'\nmesh = 'card'\ntransform = { scale = 4.0 }\n",
+        );
+        (scene.settings.width, scene.settings.height, scene.settings.spp) = (31, 17, 2);
+        let mut film = Film::moving(&gpu, &scene, Reproject { reproject_light: 1e9, ..by(way) });
+        film.frame(film.camera);
+        let card = scene.rig.placement("card").unwrap();
+        let carried = [4.0, -4.0].map(|z| {
+            let at = Transform::try_from([4., 0., 0., 0., 0., 4., 0., 0., 0., 0., z, 0., 0., 0., 0., 1.]).unwrap();
+            let change = scene.apply(&Pose { instances: vec![(card, at)], ..Pose::default() }).unwrap();
+            film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+            film.frame(film.camera);
+            film.renderer.carriage().unwrap().carried
+        });
+        assert_eq!(carried, [31 * 17, 0], "{way:?}: as it was, and turned over");
+    }
+    assert_silent(&gpu);
+}
+
 /// Sunlight on a floor, and a bulb in the shade of a slab.
 fn shade() -> Loaded {
     let mut scene = Workplace::new().scene(
