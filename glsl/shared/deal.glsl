@@ -198,15 +198,11 @@ void decide_mask(inout Walk w) {
     w.masked = false;
 }
 
-// Tests the spheres of `leaves`, which decide by themselves about masks.
+// Tests the spheres of `leaves`, with their masks.
 void meet_spheres(inout Walk w, uvec2 from) {
     do {
-        uint index = w.leaves.first + take_highest(w.spheres), instance = w.leaves.instance;
-        bool inside = index == from.x && (!FX_INSTANCES || instance == from.y);
-        float t;
-        vec2 normal;
-        if (intersect_sphere(w.leaves.ray, index, instance, w.t.hit.t, inside, w.mask_seed, t, normal))
-            w.t.hit = Hit(t, index, instance, normal.x, normal.y);
+        uint index = w.leaves.first + take_highest(w.spheres);
+        intersect_masked(w.t.hit, w.leaves.ray, index, w.leaves.instance, w.mask_seed, from, true);
         if (w.any_hit && w.t.hit.triangle != NONE) w.spheres = 0u;
     } while (w.spheres != 0u);
 }

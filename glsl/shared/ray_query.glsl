@@ -23,11 +23,9 @@ uvec2 candidate_surface(uint root) {
                       rayQueryGetIntersectionInstanceCustomIndexEXT(query, false), root);
 }
 
-bool is_left(uvec2 surface, uvec2 from) { return surface.x == from.x && (!FX_INSTANCES || surface.y == from.y); }
-
 // Whether a triangle stops the ray. Spheres lie among the triangles, and the device takes their numbers for corners.
 bool triangle_stops(uvec2 surface, uint mask_seed, uvec2 from) {
-    if (is_left(surface, from) || (FX_SPHERES && is_sphere(surface.x))) return false;
+    if (is_left(surface.x, surface.y, from) || (FX_SPHERES && is_sphere(surface.x))) return false;
     vec2 barycentric = rayQueryGetIntersectionBarycentricsEXT(query, false);
     vec3 direction = rayQueryGetIntersectionObjectRayDirectionEXT(query, false);
     return !FX_ALPHA_MASKS || mask_blocks(surface.x, surface.y, barycentric, direction, mask_seed);
@@ -38,11 +36,12 @@ void decide_sphere(uvec2 surface, Segment ray, uvec2 from, inout vec2 normal) {
     RaySpace space = ray_space(rayQueryGetIntersectionObjectRayOriginEXT(query, false),
                                rayQueryGetIntersectionObjectRayDirectionEXT(query, false));
     bool found = rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionNoneEXT;
-    float t_max = found ? rayQueryGetIntersectionTEXT(query, true) : ray.t_max, t;
-    vec2 point;
-    if (!intersect_sphere(space, surface.x, surface.y, t_max, is_left(surface, from), ray.mask_seed, t, point)) return;
-    rayQueryGenerateIntersectionEXT(query, t);
-    normal = point;
+    float t_max = found ? rayQueryGetIntersectionTEXT(query, true) : ray.t_max;
+    Hit hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
+    intersect_masked(hit, space, surface.x, surface.y, ray.mask_seed, from, true);
+    if (hit.triangle == NONE) return;
+    rayQueryGenerateIntersectionEXT(query, hit.t);
+    normal = vec2(hit.b1, hit.b2);
 }
 
 // What the device has settled on; `normal` is that of a sphere.
@@ -77,7 +76,7 @@ Hit query_hit(Segment ray, bool any_hit, uint root, uvec2 from) {
             else if (!box && triangle_stops(surface, ray.mask_seed, from)) rayQueryConfirmIntersectionEXT(query);
         }
         hit = committed_hit(ray, root, normal);
-        again = !every && hit.triangle != NONE && is_left(uvec2(hit.triangle, hit.instance), from);
+        again = !every && hit.triangle != NONE && is_left(hit.triangle, hit.instance, from);
         every = true;
     } while (again);
     return hit;

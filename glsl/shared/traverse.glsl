@@ -96,9 +96,8 @@ bool intersect_triangle(RaySpace r, uint index, float t_max, out float t, out ve
 
 // Intersects a sphere (after Haines, Guenther, Akenine-Moeller 2019, Ray Tracing Gems, chapter 7). It finds the ray's point
 // nearest to the centre in two steps, since the first one's rounding matters for far or small spheres; both hits lie half the
-// chord from there. A ray that `leaves` the sphere meets only its far side. A mask decides on each side separately.
-bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool leaves, uint mask_seed, out float t,
-                      out vec2 normal) {
+// chord from there. With `far`, a ray that leaves the sphere or was let in meets only its far side; it becomes whether that is met.
+bool intersect_sphere(RaySpace r, uint index, float t_max, inout bool far, out float t, out vec2 normal) {
     vec3 pole = Triangle_v1(triangles, index), from_centre = r.origin - Triangle_v0(triangles, index);
     float inverse = inversesqrt(dot(r.direction, r.direction));
     vec3 d = r.direction * inverse;
@@ -109,22 +108,10 @@ bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool l
     along += rest;
     float squared = dot(pole, pole) - dot(nearest, nearest);
     float chord = sqrt(max(squared, 0.0)); // half its length
-    bool enters = !leaves && -along - chord > 0.0;
-    normal = octahedral_point(nearest + (enters ? -chord : chord) * d);
-    bool passes = false;
-    if (FX_ALPHA_MASKS) {
-        bool near;
-        do {
-            near = enters;
-            float at = ((near ? -chord : chord) - along) * inverse;
-            uint seed = near ? mask_seed : mask_seed ^ mask_bits(~0u);
-            passes = squared >= 0.0 && (near || at > 0.0) && at < t_max && !mask_blocks(index, instance, normal, r.direction, seed);
-            enters = near && !passes;
-            if (near && passes) normal = octahedral_point(nearest + chord * d);
-        } while (near && passes);
-    }
-    t = ((enters ? -chord : chord) - along) * inverse;
-    return squared >= 0.0 && !passes && t > 0.0 && t < t_max;
+    far = far || !(-along - chord > 0.0);
+    normal = octahedral_point(nearest + (far ? chord : -chord) * d);
+    t = ((far ? chord : -chord) - along) * inverse;
+    return squared >= 0.0 && t > 0.0 && t < t_max;
 }
 
 // Near and far distances round at 2^-24 in four steps each; boxes that share a face must not leave a gap (Ize 2013).
@@ -241,13 +228,13 @@ struct Leaves {
     uint instance;
 };
 
-// Intersects a triangle or sphere, unless it is what the ray leaves: see `traversal_step`.
-bool intersect_primitive(RaySpace r, uint index, uint instance, float t_max, uint mask_seed, uvec2 from, out float t,
-                         out vec2 barycentric) {
-    bool is_left = index == from.x && (!FX_INSTANCES || instance == from.y);
-    bool meets = intersect_triangle(r, index, t_max, t, barycentric) && !is_left;
-    if (FX_SPHERES && is_sphere(index))
-        meets = intersect_sphere(r, index, instance, t_max, is_left, mask_seed, t, barycentric);
+// Whether a ray leaves this triangle or sphere: see `traversal_step`.
+bool is_left(uint index, uint instance, uvec2 from) { return index == from.x && (!FX_INSTANCES || instance == from.y); }
+
+// Intersects a triangle or sphere. `far` says whether the ray leaves it, and becomes whether it meets the far side of a sphere.
+bool intersect_primitive(RaySpace r, uint index, float t_max, inout bool far, out float t, out vec2 barycentric) {
+    bool meets = intersect_triangle(r, index, t_max, t, barycentric) && !far;
+    if (FX_SPHERES && is_sphere(index)) meets = intersect_sphere(r, index, t_max, far, t, barycentric);
     return meets;
 }
 
@@ -255,7 +242,7 @@ bool intersect_primitive(RaySpace r, uint index, uint instance, float t_max, uin
 // the index that it tested last, or the scene's first, so that it misses no cache. An any hit ends the loop one triangle late, so
 // that the next fetch waits for no test and tests overlap. Variables that live from turn to turn are scalar, since vectors would
 // be copied.
-bool intersect_triangles(inout Hit hit, Leaves leaves, bool any_hit, uint mask_seed, uvec2 from) {
+bool intersect_triangles(inout Hit hit, Leaves leaves, bool any_hit, uvec2 from) {
     uint left = leaves.bits, instance = leaves.instance;
     bool found = false;
     if (left != 0u) do {
@@ -263,8 +250,8 @@ bool intersect_triangles(inout Hit hit, Leaves leaves, bool any_hit, uint mask_s
         if (found && any_hit) left = 0u;
         float distance;
         vec2 barycentric;
-        bool meets = intersect_primitive(leaves.ray, index, instance, hit.t, mask_seed, from, distance, barycentric) &&
-                     !(found && any_hit);
+        bool far = is_left(index, instance, from);
+        bool meets = intersect_primitive(leaves.ray, index, hit.t, far, distance, barycentric) && !(found && any_hit);
         if (meets) {
             hit.t = distance;
             hit.triangle = index;
@@ -277,36 +264,46 @@ bool intersect_triangles(inout Hit hit, Leaves leaves, bool any_hit, uint mask_s
     return found;
 }
 
-// Tests a triangle or sphere together with its mask.
-void intersect_masked(inout Hit hit, RaySpace ray, uint index, uint instance, uint mask_seed, uvec2 from) {
-    float t;
-    vec2 barycentric;
-    bool meets = intersect_primitive(ray, index, instance, hit.t, mask_seed, from, t, barycentric);
-    if (FX_ALPHA_MASKS && meets && !(FX_SPHERES && is_sphere(index))) // spheres have tested their mask
-        meets = mask_blocks(index, instance, barycentric, ray.direction, mask_seed);
-    if (meets) hit = Hit(t, index, instance, barycentric.x, barycentric.y);
+// Tests a triangle or sphere together with its mask, which decides on each side of a sphere separately. With `sphere` it is one.
+void intersect_masked(inout Hit hit, RaySpace ray, uint index, uint instance, uint mask_seed, uvec2 from, bool sphere) {
+    bool far = is_left(index, instance, from), passes_near;
+    do {
+        float t;
+        vec2 barycentric;
+        bool meets;
+        if (sphere) meets = intersect_sphere(ray, index, hit.t, far, t, barycentric);
+        else meets = intersect_primitive(ray, index, hit.t, far, t, barycentric);
+        passes_near = false;
+        if (FX_ALPHA_MASKS && meets) {
+            bool on_sphere = FX_SPHERES && (sphere || is_sphere(index));
+            uint seed = on_sphere && far ? mask_seed ^ mask_bits(~0u) : mask_seed;
+            meets = mask_blocks(index, instance, barycentric, ray.direction, seed);
+            passes_near = on_sphere && !far && !meets;
+            far = true;
+        }
+        if (meets) hit = Hit(t, index, instance, barycentric.x, barycentric.y);
+    } while (passes_near);
 }
 
 // Tests the triangles of `leaves`. Only the nearest one's mask is looked up; where the ray passes it, the others are tested again.
-// Not where walls count how often they are asked.
+// Not where walls count how often they are asked, nor among spheres, which may be met once more.
 void intersect_leaves(inout Hit hit, Leaves leaves, bool any_hit, uint mask_seed, uvec2 from) {
     if (!FX_ALPHA_MASKS) {
-        intersect_triangles(hit, leaves, any_hit, mask_seed, from);
+        intersect_triangles(hit, leaves, any_hit, from);
         return;
     }
-    if (FX_CLEAR_WALLS) {
+    if (FX_CLEAR_WALLS || FX_SPHERES) {
         if (leaves.bits != 0u) do {
             uint index = leaves.first + take_highest(leaves.bits);
-            intersect_masked(hit, leaves.ray, index, leaves.instance, mask_seed, from);
+            intersect_masked(hit, leaves.ray, index, leaves.instance, mask_seed, from, false);
         } while (leaves.bits != 0u && !(any_hit && hit.triangle != NONE));
         return;
     }
     bool passes;
     if (leaves.bits != 0u) do {
         Hit next = hit;
-        bool found = intersect_triangles(next, leaves, any_hit, mask_seed, from);
+        bool found = intersect_triangles(next, leaves, any_hit, from);
         passes = found && !mask_blocks(next.triangle, leaves.instance, vec2(next.b1, next.b2), leaves.ray.direction, mask_seed);
-        if (FX_SPHERES && found) passes = passes && !is_sphere(next.triangle); // spheres have tested their mask
         if (passes) leaves.bits &= ~(1u << (next.triangle - leaves.first));
         else hit = next;
     } while (passes && leaves.bits != 0u);
@@ -371,7 +368,7 @@ void intersect_kept(inout Traversal t, RaySpace world, uint mask_seed, uvec2 fro
     if (FX_INSTANCES) ray = select_ray(t.kept_instance != NONE, t.inside, world);
     [[unroll]] for (uint i = 0u; i < TRIANGLES_A_STEP; i++) {
         if (t.kept_bits == 0u) break;
-        intersect_masked(t.hit, ray, t.kept_first + take_highest(t.kept_bits), t.kept_instance, mask_seed, from);
+        intersect_masked(t.hit, ray, t.kept_first + take_highest(t.kept_bits), t.kept_instance, mask_seed, from, false);
     }
 }
 

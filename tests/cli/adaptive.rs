@@ -127,7 +127,8 @@ fn interrupted(words: &str, spp: u64) {
 
 #[test]
 fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
-    interrupted("", spp_of_steps(96 * 80));
+    // Half as many again: two more steps begin after the one in which the signal should come.
+    interrupted("", spp_of_steps(96 * 80) * 3 / 2);
     interrupted("--allocate variance --rounds 20", 100);
 }
 

@@ -31,12 +31,13 @@ fn primary_hits_are_found_only_for_files_that_keep_them() {
 #[test]
 fn explain_tells_what_effects_cost() {
     let folder = tempfile::tempdir().unwrap();
-    // Two samples of each of 512 x 512 pixels are in flight at a time.
+    // Two samples of each of 128 x 128 pixels are in flight at a time.
     let file = format!("file = \"{}/", BOX.trim_end_matches("/scene.toml"));
-    let scene = std::fs::read_to_string(BOX).unwrap().replace("spp = 64", "spp = 2").replace("file = \"", &file);
+    let small = [("spp = 64", "spp = 2"), ("= 512", "= 128"), ("file = \"", &file)];
+    let scene = small.iter().fold(std::fs::read_to_string(BOX).unwrap(), |text, (from, to)| text.replace(from, to));
     std::fs::write(folder.path().join("box.toml"), scene).unwrap();
     let document = json(&folder, &["explain", "box.toml", "textures", "emissive", "adaptive", "guides", "--json"]);
-    assert_eq!(document["film_size"], serde_json::json!([512, 512]));
+    assert_eq!(document["film_size"], serde_json::json!([128, 128]));
     let rows = &document["effects"];
     let names: Vec<_> = rows.as_array().unwrap().iter().map(|row| row["effect"].as_str().unwrap()).collect();
     assert_eq!(names, ["textures", "emissive", "adaptive", "guides"]);
@@ -54,11 +55,11 @@ fn explain_tells_what_effects_cost() {
         assert!(with > 0.0 && without > 0.0 && low <= high, "{row}");
     }
     assert_eq!([&adaptive["gpu_ms_with"], &adaptive["gpu_ms_added"]], [&Value::Null; 2]);
-    // The lamp's two triangles, with their entries in the alias table; a guide for each of 512 x 512 primary hits, and where
+    // The lamp's two triangles, with their entries in the alias table; a guide for each of 128 x 128 primary hits, and where
     // samples are placed 20 bytes a pixel, weight, count, offset and priority, and 8 bytes for each of two paths. Where they are
     // not, buffers have one element.
     assert_eq!(emissive["bytes"], 2 * (size_of::<Light>() + size_of::<AliasEntry>()));
-    let pixels = 512 * 512;
+    let pixels = 128 * 128;
     for (row, bytes) in [(guides, size_of::<Guide>() as u64 * pixels), (adaptive, (20 + 2 * 8) * pixels)] {
         assert!(row["bytes"].as_u64().unwrap().abs_diff(bytes) < 1024, "{row}");
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Effects, PixelStats, Texture};
-use tallow::render::{Moves, Outputs, Renderer, Reproject, all_effects};
+use tallow::render::{Moves, Outputs, Renderer, Reproject, all_effects, called_for};
 use tallow::scene::description::{LightTable, Rgb};
 use tallow::scene::{Change, Environment, EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
 
@@ -131,10 +131,12 @@ fn lamps_and_sky_that_come_to_shine_stay_out_of_sharp_direct_light() {
     let glow = MaterialChange { emission: Some([9.0; 3]), ..MaterialChange::default() };
     let poses =
         [Pose { environment: Some(dawn), ..Pose::default() }, Pose { materials: vec![(0, glow)], ..Pose::default() }];
+    let mut lit = load();
+    poses.iter().for_each(|pose| drop(lit.apply(pose).unwrap()));
+    let all = called_for(&lit, &lit.settings, split);
     let mut frame = FrameResources::new(&gpu).unwrap();
     for pose in poses {
         let mut scene = load();
-        let all = all_effects(&scene, &scene.settings);
         let with = |effects, outputs| Renderer::specialised(&gpu, &scene, &scene.settings, outputs, effects).unwrap();
         let without = Effects { soft_light: false, ..all };
         let (mut able, mut unable, mut whole) = (with(all, split), with(without, split), with(without, OUTPUTS));

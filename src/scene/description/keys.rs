@@ -87,7 +87,7 @@ mod tests {
     /// The material of a table, and what is said about it.
     fn build(t: &toml::Table, folder: &Path) -> (Result<Material, String>, String) {
         let (mut materials, mut warnings) = (Materials::default(), Vec::new());
-        let table: MaterialTable = toml::Value::from(t.clone()).try_into().unwrap();
+        let table: MaterialTable = toml::from_str(&t.to_string()).unwrap();
         let built = materials.push_table(&table, folder, &mut warnings).map(|_| materials.list[0]);
         (built, warnings.concat())
     }
