@@ -2,21 +2,26 @@
 // lanes which test their own wait for each other. Here the triangles are dealt to all lanes, which test them for each other:
 // on lavapipe in a third of the turns. Every function must be called by all lanes, and returns the same bits as each ray alone.
 #include "shared/traverse.glsl"
+
+// Whether some of what rays meet is looked at apart.
+const bool APART = FX_ALPHA_MASKS || FX_SPHERES;
+
 #ifdef RAY_QUERY
-const uint LANES = 0u;
-uint this_lane() { return 0u; } // neither is called
-uint from_lane(uint x, uint lane) { return x; }
+const bool DEALT = false;
+bool any_lane(bool says) { return says; }
+// Neither is called.
+Hit deal_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
+    return Hit(0.0, NONE, NONE, 0.0, 0.0);
+}
+Hit deal_closest(Segment ray, bool on, uint root) { return Hit(0.0, NONE, NONE, 0.0, 0.0); }
 #else
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_shuffle : require
 layout(constant_id = 105) const uint LANES = 0u; // lanes of a subgroup, a power of two from 4 to 32; 0: each ray tests its own
 uint this_lane() { return gl_SubgroupInvocationID; }
 uint from_lane(uint x, uint lane) { return subgroupShuffle(x, lane); }
-#endif
 
 const bool DEALT = FX_DEALT && LANES > 0u;
-// Whether some of what rays meet is looked at apart.
-const bool APART = FX_ALPHA_MASKS || FX_SPHERES;
 const uint LAST_LANE = LANES - 1u;
 
 float from_lane(float x, uint lane) { return uintBitsToFloat(from_lane(floatBitsToUint(x), lane)); }
@@ -272,3 +277,4 @@ Hit deal_closest(Segment ray, bool on, uint root) {
     bool shadowed = false;
     return deal_shadow_then_closest(ray, shadowed, ray, on, root, uvec2(NONE));
 }
+#endif
