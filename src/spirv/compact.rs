@@ -82,6 +82,7 @@ fn has_only_ids(opcode: u16) -> bool {
     let computes = matches!(
         opcode,
         op::ACCESS_CHAIN
+            | op::VECTOR_EXTRACT_DYNAMIC
             | op::COMPOSITE_CONSTRUCT
             | op::TRANSPOSE
             | op::CONVERT_F_TO_U..=op::BITCAST

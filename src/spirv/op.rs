@@ -35,6 +35,7 @@ pub const STORE: u16 = 62;
 pub const ACCESS_CHAIN: u16 = 65;
 pub const DECORATE: u16 = 71;
 pub const MEMBER_DECORATE: u16 = 72;
+pub const VECTOR_EXTRACT_DYNAMIC: u16 = 77;
 pub const VECTOR_SHUFFLE: u16 = 79;
 pub const COMPOSITE_CONSTRUCT: u16 = 80;
 pub const COMPOSITE_EXTRACT: u16 = 81;
