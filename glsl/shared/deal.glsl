@@ -9,7 +9,7 @@ const bool APART = FX_ALPHA_MASKS || FX_SPHERES;
 #ifdef RAY_QUERY
 const bool DEALT = false;
 bool any_lane(bool says) { return says; }
-// Neither is called.
+// `DEALT` rules out both calls: there are no lanes to deal to.
 Hit deal_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
     return Hit(0.0, NONE, NONE, 0.0, 0.0);
 }
