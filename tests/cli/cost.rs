@@ -304,7 +304,9 @@ fn what_cannot_be_measured_is_one_line() {
     complains(&cost(&folder, "--denoise blur"), 2, &["blur"]);
     complains(&cost(&folder, "--repeats 1"), 2, &["1"]);
     complains(&within(&folder, "cost --filter-only other.exr").output().unwrap(), 2, &["--reference"]);
-    for option in ["--spp 4", "--allocate both", "--rounds 2", "--fps 12", "--ablate", "--reference-spp 128"] {
+    for option in
+        ["--spp 4", "--allocate both", "--rounds 2", "--fps 12", "--ablate", "--reference-spp 128", "--width 8"]
+    {
         let words = format!("cost --filter-only other.exr --reference other.exr {option}");
         complains(&within(&folder, &words).output().unwrap(), 2, &["--filter-only", option.split(' ').next().unwrap()]);
     }

@@ -10,7 +10,6 @@ use crate::error::{Error, Result};
 use crate::gpu::Tracing;
 use crate::render::settings::{Film, Settings};
 use crate::render::{Reproject, ReprojectOverrides, Reprojection};
-use crate::settings::entry::Entry;
 use clap::{Arg, Args as _, Parser};
 use std::path::PathBuf;
 
@@ -120,18 +119,24 @@ pub struct Args {
 
 /// Settings of the film, with their ranges in the help.
 #[derive(clap::Args)]
-#[command(next_help_heading = "Film", mut_args(with_ranges_of_film()))]
+#[command(next_help_heading = "Film", mut_args(as_of_film()))]
 pub struct FilmOptions {
     /// Settings of the film.
     #[command(flatten)]
     film: Film,
 }
 
-/// Ranges of the film's settings and no others: this reaches the options of the grid too, and its lists have names of settings.
-fn with_ranges_of_film() -> impl FnMut(Arg) -> Arg {
+/// Ranges of the film's settings, which an image that is given leaves nothing to say. This reaches the options of the grid too, whose
+/// lists have names of settings.
+fn as_of_film() -> impl FnMut(Arg) -> Arg {
     let film = Film::augment_args(clap::Command::new("film"));
-    let is_of_film = |entry: &Entry| film.get_arguments().any(|arg| arg.get_long() == Some(&*entry.name));
-    with_ranges(Settings::default().entries().into_iter().filter(is_of_film).collect())
+    let is_of_film = move |name: Option<&str>| film.get_arguments().any(|arg| arg.get_long() == name);
+    let entries = Settings::default().entries().into_iter().filter(|entry| is_of_film(Some(&*entry.name)));
+    let mut ranged = with_ranges(entries.collect());
+    move |arg| {
+        let arg = ranged(arg);
+        if is_of_film(arg.get_long()) { arg.conflicts_with("filter_only") } else { arg }
+    }
 }
 
 impl FilmOptions {
