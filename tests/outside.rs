@@ -4,7 +4,7 @@ mod support;
 use glam::Vec3;
 use std::path::{Path, PathBuf};
 use tallow::gpu::Gpu;
-use tallow::layout::Effects;
+use tallow::layout::{Effect, Effects};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer, all_effects, called_for};
 use tallow::scene::{Loaded, Scene};
@@ -92,15 +92,38 @@ fn is_expected(line: &str) -> bool {
     ["in material", "in mesh", "not rendered", "is orthographic", "not played"].iter().any(|part| line.contains(part))
 }
 
-/// Loads a file of `data` and renders it. Its name, if no light is seen.
-fn dark_gltf(gpu: &Gpu, data: &Path, path: &Path) -> Option<String> {
-    let name = path.strip_prefix(data).unwrap_or(path).display().to_string();
-    let scene = loaded(path);
-    let unexpected: Vec<_> = scene.warnings.iter().filter(|line| !is_expected(line)).collect();
-    assert!(unexpected.is_empty() && !scene.triangles.is_empty(), "{name}: {unexpected:?}");
-    // Nearly every model has effects of its own, whose kernels would take two seconds each.
-    let (_, lit) = rendered(gpu, &scene, all_effects(&scene, &scene.settings), &name);
-    (!lit).then_some(name)
+/// What a model of glTF may call for. Nearly every one has effects of its own, whose kernels would take two seconds each.
+///
+/// # Panics
+/// When it calls for something else.
+fn effects_of_gltf(scene: &Loaded, name: &str) -> Effects {
+    let called_for = called_for(scene, &scene.settings, Outputs::default());
+    // A few of them are lit by one sort of lamps that no other has.
+    if scene.weighed_lights || scene.large_lamps && scene.has_light_tree() {
+        return called_for;
+    }
+    let others = [
+        Effect::bump_maps,
+        Effect::hdr_textures,
+        Effect::conductor,
+        Effect::dielectric,
+        Effect::coated,
+        Effect::beckmann,
+        Effect::spheres,
+        Effect::environment_map,
+        Effect::lens,
+        Effect::orthographic,
+        Effect::roulette,
+        Effect::clamp,
+        Effect::pixel_filter,
+        Effect::split_light,
+        Effect::counters,
+        Effect::adaptive,
+    ];
+    let mut effects = all_effects(scene, &scene.settings);
+    others.into_iter().for_each(|effect| *effects.switch(effect) = false);
+    assert_eq!(effects.or(called_for), effects, "{name} calls for more");
+    effects
 }
 
 #[test]
@@ -110,20 +133,23 @@ fn every_gltf_loads_and_renders() {
     let mut paths = Vec::new();
     files(&data.join("scenes"), &["gltf", "glb"], &mut paths);
     assert!(paths.len() >= 65, "only {} glTF files below {}", paths.len(), data.display());
-    let half = |paths: &[PathBuf]| {
-        let gpu = support::gpu();
-        let dark: Vec<_> = paths.iter().filter_map(|path| dark_gltf(&gpu, &data, path)).collect();
-        support::assert_silent(&gpu);
-        dark
-    };
-    // Most of the time kernels are compiled, each by one thread.
-    let (first, second) = paths.split_at(paths.len() / 2);
-    let dark = std::thread::scope(|scope| {
-        let other = scope.spawn(|| half(second));
-        [half(first), other.join().unwrap()].concat()
+    let gpu = support::gpu();
+    let (send, loads) = std::sync::mpsc::sync_channel(1);
+    let mut dark = Vec::new();
+    std::thread::scope(|scope| {
+        // One thread reads files, the other compiles kernels.
+        scope.spawn(move || paths.into_iter().try_for_each(|path| send.send((loaded(&path), path)).ok()));
+        for (scene, path) in loads {
+            let name = path.strip_prefix(&data).unwrap_or(&path).display().to_string();
+            let unexpected: Vec<_> = scene.warnings.iter().filter(|line| !is_expected(line)).collect();
+            assert!(unexpected.is_empty() && !scene.triangles.is_empty(), "{name}: {unexpected:?}");
+            let (_, lit) = rendered(&gpu, &scene, effects_of_gltf(&scene, &name), &name);
+            dark.extend((!lit).then_some(name));
+        }
     });
     // A camera stands within a pine of a dense forest, where no one of 64 paths may find the sky.
     assert!(dark.len() <= 1, "black: {dark:?}");
+    support::assert_silent(&gpu);
 }
 
 /// The frames of `animation/fox_run` were skinned by another program, in metres where the file has centimetres.

@@ -19,8 +19,8 @@ use tallow::render::settings::Settings;
 use tallow::render::{Job, Layer, OutputView, Outputs, Renderer, Step};
 use tallow::scene::Scene;
 
-const WIDTH: u32 = 65;
-const HEIGHT: u32 = 33;
+/// Of films whose pixels an engine copies one by one: the validation layers remember every copy.
+const SIZE: [u32; 2] = [17, 9];
 const SPP: u32 = 4;
 
 fn scene_file() -> std::path::PathBuf {
@@ -30,16 +30,16 @@ fn scene_file() -> std::path::PathBuf {
 /// One that decides nothing, one that apportions, and one whose lists are of a length that only the device knows.
 const POLICIES: [&str; 3] = ["uniform", "both", "threshold"];
 
-fn small(s: &mut Settings, policy: &str) {
-    (s.width, s.height, s.spp, s.max_depth) = (WIDTH, HEIGHT, SPP, 4);
+fn small(s: &mut Settings, [width, height]: [u32; 2], policy: &str) {
+    (s.width, s.height, s.spp, s.max_depth) = (width, height, SPP, 4);
     s.allocate.policy = tallow::allocate::policy(policy).unwrap();
 }
 
 /// The film that the command line writes for the same settings.
-fn command_line(policy: &str) -> Film {
+fn command_line(size: [u32; 2], policy: &str) -> Film {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("box.exr");
-    let [width, height, spp] = [WIDTH, HEIGHT, SPP].map(|n| n.to_string());
+    let [width, height, spp] = [size[0], size[1], SPP].map(|n| n.to_string());
     let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
     command.arg("render").arg(scene_file()).arg("-o").arg(&file).arg("--quiet").args(["--max-depth", "4"]);
     command.args(["--width", &width, "--height", &height, "--spp", &spp, "--allocate", policy]);
@@ -73,11 +73,11 @@ fn an_engine_gets_the_bits_of_the_command_line_frame_after_frame() {
 }
 
 fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
-    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, policy))).unwrap();
+    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, SIZE, policy))).unwrap();
     let outputs = Outputs::FILTERED;
     let mut renderer = Renderer::new(gpu, &scene, &scene.settings, outputs).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
-    let pixels = (WIDTH * HEIGHT) as usize;
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
     let download = Buffer::<vec3>::new(gpu, "download", pixels, Location::Readback).unwrap();
     let mut record = |renderer: &Renderer| {
         engine.run(|commands| unsafe {
@@ -90,7 +90,7 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
         });
         download.read().unwrap()
     };
-    let expected = command_line(policy).picture(None).unwrap().pixels;
+    let expected = command_line(SIZE, policy).picture(None).unwrap().pixels;
     for _ in 0..3 {
         assert!(record(&renderer) == expected, "{policy}: the engine's pixels are not those of the command line");
     }
@@ -111,7 +111,7 @@ fn an_engine_keeps_a_steady_frame_time() {
     let engine = Engine::new();
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
-    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, "uniform"))).unwrap();
+    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, SIZE, "uniform"))).unwrap();
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let mut chosen_within = |budget: Duration| {
@@ -143,15 +143,15 @@ fn an_engine_gets_every_layer() {
     let engine = Engine::new();
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
-    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, "uniform"))).unwrap();
+    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, SIZE, "uniform"))).unwrap();
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    let pixels = (WIDTH * HEIGHT) as usize;
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
     let vectors = Buffer::<vec3>::new(&gpu, "vectors", pixels, Location::Readback).unwrap();
     let words = Buffer::<u32>::new(&gpu, "words", pixels, Location::Readback).unwrap();
     Job::new(&renderer).run_to_end(&mut frame).unwrap();
     let view = |layer| renderer.views(layer).unwrap()[0];
-    let film = command_line("uniform");
+    let film = command_line(SIZE, "uniform");
     for (layer, name) in [
         (Layer::Radiance, None),
         (Layer::M2, Some("m2")),
@@ -193,12 +193,12 @@ fn an_engine_gets_every_layer() {
 /// Steps and filter in one command buffer, against the command line's file taken apart, filtered and put together.
 #[test]
 fn an_engine_filters_its_frames_where_they_are() {
-    let engine = Engine::new();
+    let (engine, size) = (Engine::new(), [65, 33]); // a filter needs room
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
-    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, "uniform"))).unwrap();
+    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, size, "uniform"))).unwrap();
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
-    let film = command_line("uniform");
+    let film = command_line(size, "uniform");
     let aovs = Aovs::find(&film, &Names::new()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let download = Buffer::<vec4>::new(&gpu, "download", film.pixels(), Location::Readback).unwrap();

@@ -5,7 +5,7 @@ use crate::{both, scenes};
 use glam::Vec3;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
 use tallow::layout::{Guide, NONE, RayHit, RayQuery, TraversePush};
-use tallow::render::{self, Outputs, Renderer, frame_constants};
+use tallow::render::{self, DeviceScene, Outputs, Renderer, frame_constants};
 use tallow::scene::Loaded;
 
 const RAYS: u32 = 20_000;
@@ -27,12 +27,12 @@ fn rays(scene: &Loaded) -> Vec<RayQuery> {
 /// `behind`: what rays meet that leave their first hits.
 fn trace(gpu: &Gpu, scene: &Loaded, rays: &[RayQuery], any_hit: bool, behind: bool) -> Vec<RayHit> {
     let effects = render::called_for(scene, &scene.settings, Outputs::default());
-    let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
+    let s = DeviceScene::new(gpu, scene, &effects).unwrap();
     let mut constants = kernel::Constants { effects, thread: gpu.tuning().thread(), behind, ..Default::default() };
     constants.traverse.stack = scene.stack;
     let kernel = Kernel::<kernel::Bind>::new(gpu, &constants).unwrap();
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
-    let (rays, s) = (Buffer::from_slice(gpu, "rays", rays).unwrap(), renderer.scene());
+    let rays = Buffer::from_slice(gpu, "rays", rays).unwrap();
     let root = frame_constants(scene, &scene.settings).unwrap().path.root;
     let push = TraversePush { count: RAYS, root, any_hit: any_hit.into(), ..Default::default() };
     let bind = kernel::Bind { scene: s.bind(), ray_query: s.bind_world(), rays: &rays, hits: &hits };

@@ -2,7 +2,9 @@
 //! give the known answer of furnaces, and have no broken pixel.
 use crate::alike::alike;
 use crate::support;
+use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Mutex;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
 use tallow::layout::{
     BSDF_COATED, BSDF_DIFFUSE, Effect, Effects, Guide, LIGHT_POINT, Material, NONE, PixelLight, PixelStats, Triangle,
@@ -158,36 +160,41 @@ fn more_samples(s: &mut Settings) {
     s.spp = 16;
 }
 
+/// Those with the same random numbers share a kernel with all effects, and most of the time those are compiled: each by one thread.
 #[test]
 fn every_scene_renders_finite_pixels_and_the_same_with_all_effects() {
     let files = scenes();
-    // Most of the time kernels are compiled, by one thread.
-    std::thread::scope(|scope| {
-        for half in 0..2 {
-            let files = &files;
-            scope.spawn(move || {
-                let gpu = support::gpu();
-                files
-                    .iter()
-                    .skip(half)
-                    .step_by(2)
-                    .for_each(|file| renders_the_same_with_all_effects(&gpu, file, files.len()));
-                support::assert_silent(&gpu);
-            });
+    let mut groups: HashMap<Effects, Vec<(&str, Loaded)>> = HashMap::new();
+    for file in &files {
+        let mut scene = scene(file, small);
+        scene.stack = scene.stack.max(16); // for all depths one kernel
+        groups.entry(render::all_effects(&scene, &scene.settings)).or_default().push((file, scene));
+    }
+    let mut groups: Vec<_> = groups.into_values().collect();
+    groups.sort_by_key(Vec::len);
+    let groups = Mutex::new(groups);
+    let next = || groups.lock().unwrap().pop();
+    let render_groups = || {
+        let gpu = support::gpu();
+        for (file, scene) in std::iter::from_fn(next).flatten() {
+            renders_the_same_with_all_effects(&gpu, file, &scene, files.len());
         }
+        support::assert_silent(&gpu);
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(render_groups);
+        render_groups();
     });
 }
 
-fn renders_the_same_with_all_effects(gpu: &Gpu, file: &str, renders: usize) {
-    let mut scene = scene(file, small);
-    scene.stack = scene.stack.max(16); // kernels with all effects are compiled once, not for every depth
-    let [plain, all] = plain_and_all(gpu, &scene);
+fn renders_the_same_with_all_effects(gpu: &Gpu, file: &str, scene: &Loaded, renders: usize) {
+    let [plain, all] = plain_and_all(gpu, scene);
     let (a, b) = (support::render(gpu, &plain), support::render(gpu, &all));
     assert!(a.iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{file}: broken pixels");
     assert!(a.iter().any(|s| s.mean != [0.0; 3]), "{file}: black");
     if bits(&a) != bits(&b) {
         alike_with_all_effects(gpu, file, renders)
-            .unwrap_or_else(|e| panic!("{file}: {e}; effects that change it: {}", culprits(gpu, &scene, &a)));
+            .unwrap_or_else(|e| panic!("{file}: {e}; effects that change it: {}", culprits(gpu, scene, &a)));
     }
     let light = plain.film().tiles[0].light.read().unwrap();
     assert!(light.iter().all(|l| l.direct.iter().chain(&l.albedo).all(|v| v.is_finite())), "{file}");

@@ -12,7 +12,7 @@ use std::path::Path;
 use tallow::gpu::{Buffer, DeviceKind, FrameResources, Gpu, Kernel, Location};
 use tallow::layout::*;
 use tallow::render::settings::{PixelFilter, Settings, Split};
-use tallow::render::{Batch, Outputs, Renderer, Step, all_effects, called_for, frame_constants};
+use tallow::render::{Batch, DeviceScene, Outputs, Renderer, Step, all_effects, called_for, frame_constants};
 use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
 use tallow::twins::accumulate::fold;
@@ -146,6 +146,13 @@ pub fn twin_samples(scene: &Loaded, effects: Effects) -> (Vec<Vec3>, u32) {
     (all, samples.iter().map(|s| s.rays).sum())
 }
 
+/// With every effect, in a kernel that scenes of all depths share: it takes many seconds to compile.
+pub fn run_with_all_effects(gpu: &Gpu, scene: &Loaded) -> Pair {
+    let mut scene = scene.clone();
+    scene.stack = scene.stack.max(16);
+    run(gpu, &scene, all_effects(&scene, &scene.settings))
+}
+
 pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
     let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::FILTERED, effects).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
@@ -268,7 +275,7 @@ fn renders_agree_with_their_twins() {
     let effects = called_for(&scene, &scene.settings, outputs);
     assert!(effects.soft_light);
     check("pictures", &run(&gpu, &scene, effects));
-    check("pictures, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
+    check("pictures, all effects", &run_with_all_effects(&gpu, &scene));
     let scene = scene.with(|s| s.split = Split::Indirect);
     let mut pair = run(&gpu, &scene, called_for(&scene, &scene.settings, outputs));
     check("pictures, indirect light apart", &pair);
@@ -409,7 +416,7 @@ fn squares_of_the_brightest_samples_stay_finite() {
 /// The kernel that traces given rays, and a scene for it.
 pub struct Traversal {
     gpu: Gpu,
-    renderer: Renderer,
+    scene: DeviceScene,
     kernel: Kernel<traverse_kernel::Bind<'static>>,
     root: u32,
 }
@@ -425,26 +432,25 @@ impl Traversal {
     }
 
     fn with(gpu: &Gpu, scene: &Loaded, effects: Effects, behind: bool) -> Self {
-        let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
         let traverse = gpu.tuning().traverse(scene.stack);
         let thread = shared::thread::Constants { workgroup: 32 };
         let constants = traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu), behind };
         let kernel = Kernel::new(gpu, &constants).unwrap();
         let root = frame_constants(scene, &scene.settings).unwrap().path.root;
-        Self { gpu: gpu.clone(), renderer, kernel, root }
+        Self { gpu: gpu.clone(), scene: DeviceScene::new(gpu, scene, &effects).unwrap(), kernel, root }
     }
 
     /// Hits that the kernel finds.
     pub fn hits(&self, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
-        let Self { gpu, renderer, kernel, root } = self;
+        let Self { gpu, scene, kernel, root } = self;
         let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
         let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
         let (count, any_hit) = (rays.len() as u32, u32::from(any_hit));
         let push = TraversePush { count, root: *root, any_hit, ..Default::default() };
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| {
             let bind = traverse_kernel::Bind {
-                scene: renderer.scene().bind(),
-                ray_query: renderer.scene().bind_world(),
+                scene: scene.bind(),
+                ray_query: scene.bind_world(),
                 rays: &queries,
                 hits: &hits,
             };

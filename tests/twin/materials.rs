@@ -1,11 +1,11 @@
 //! What glTF's materials and meshes have beyond others: kernels agree with their twins on all of it, and the twins with what each
 //! setting means.
-use crate::kernels::{agreement, check, run, small, twin_samples};
+use crate::kernels::{agreement, check, run, run_with_all_effects, small, twin_samples};
 use crate::support::{assert_silent, gpu};
 use glam::{Vec2, Vec3, vec2, vec3};
 use tallow::image::{self, Film, Samples, WriteOptions};
 use tallow::layout::{ATTRIBUTE_FLIPPED, Effects, MATERIAL_MASKED, TEXTURE_NEAREST};
-use tallow::render::{Outputs, all_effects, called_for};
+use tallow::render::{Outputs, called_for};
 use tallow::scene::description::*;
 use tallow::scene::{Loaded, Scene};
 use tallow::twins::surface::{
@@ -172,7 +172,7 @@ fn materials_of_gltf_agree_with_their_twins() {
     assert_eq!([effects.coat_normals, effects.anisotropic], [true; 2]);
     let pair = run(&gpu, &scene, effects);
     check("materials", &pair);
-    check("materials, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
+    check("materials, all effects", &run_with_all_effects(&gpu, &scene));
     let by_four = run(&gpu, &scene, Effects { many_texels: true, ..effects });
     assert!(by_four.samples[0] == pair.samples[0], "words that are fetched by four are the same words");
     let whole = agreement(&pair.samples);
@@ -381,7 +381,6 @@ fn an_orthographic_camera_agrees_with_its_twin() {
     assert!(effects.orthographic && !called_for(&view(None), &scene.settings, outputs).orthographic);
     let pair = run(&gpu, &scene, effects);
     check("orthographic", &pair);
-    check("orthographic, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
     // Control: in perspective the picture is another.
     let others = run(&gpu, &view(None), Effects { orthographic: false, ..effects }).samples;
     assert!(agreement(&[others[0].clone(), pair.samples[1].clone()]) < agreement(&pair.samples) - 0.1, "control");

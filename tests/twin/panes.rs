@@ -1,8 +1,8 @@
 //! Smooth panes, which the light of lamps without extent passes although no path finds it there.
-use crate::kernels::{check, run};
+use crate::kernels::{check, run, run_with_all_effects};
 use crate::support;
 use crate::twin::Workplace;
-use tallow::render::{Outputs, Renderer, all_effects, called_for};
+use tallow::render::{Outputs, Renderer, called_for};
 use tallow::scene::Loaded;
 
 const PANE: &str = "[[material]]\nname = 'pane'\ntype = 'metallic-roughness'\nmetallic = 0.0\nroughness = 0.0\n\
@@ -40,7 +40,7 @@ fn panes_agree_with_their_twin() {
     let effects = called_for(&scene, &scene.settings, Outputs::FILTERED);
     assert!(effects.clear_walls && effects.alpha_masks);
     check("panes", &run(&gpu, &scene, effects));
-    check("panes, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
+    check("panes, all effects", &run_with_all_effects(&gpu, &scene));
     support::assert_silent(&gpu);
 }
 
