@@ -47,6 +47,30 @@ fn a_frame_that_cannot_be_written_is_left_to_the_same_command() {
     assert!(["frames/a.0.exr", "frames/a.1.exr"].iter().all(|name| image::read(&inside(name)).is_ok()));
 }
 
+#[test]
+fn a_disk_that_takes_two_frames_in_a_row_no_more_ends_a_sequence() {
+    let folder = tempfile::tempdir().unwrap();
+    let frame = |n: u32| folder.path().join(format!("a.{n}.exr"));
+    let words = format!("sequence {} {SMALL} --spp 1 --frames 0..4 -o a.#.exr", scene());
+    let full = |n: u32| std::os::unix::fs::symlink("/dev/full", frame(n)).unwrap();
+    let told = || {
+        let output = run(&folder, &words);
+        assert_eq!(output.status.code(), Some(6), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    full(0);
+    full(1);
+    let text = told();
+    let ends = "frames 0 and 1 could not be written, so that no more are rendered";
+    assert!(text.lines().count() == 3 && text.contains(ends) && text.contains("goes on there"), "{text}");
+    assert!(!frame(2).exists() && !frame(3).exists());
+    std::fs::remove_file(frame(1)).unwrap();
+    full(2);
+    let text = told();
+    assert!(text.lines().count() == 2 && !text.contains("no more"), "{text}");
+    assert!(image::read(&frame(1)).is_ok() && image::read(&frame(3)).is_ok());
+}
+
 /// Interrupts a render whose folder has gone.
 fn lost_folder(folder: &TempDir, cwd: &str) -> Output {
     let inside = |name: &str| folder.path().join(name);

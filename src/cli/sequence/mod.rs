@@ -27,8 +27,8 @@ use std::time::{Duration, Instant};
 ///
 /// Frame n shows the scene n / fps seconds after the start of its `[[animation]]` tables. Files have `####` for the number of the
 /// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose, settings and filter is not rendered
-/// again; its other pictures are written anew. A frame that fails, or cannot be written, does not stop the others: the exit code is 6
-/// then, and the same command renders it again. A camera without position has in view what all of --frames reach.
+/// again; its other pictures are written anew. A frame that fails, or cannot be written, does not stop the others, but two in a row
+/// that cannot be written do: the exit code is 6 then, and the same command renders them again. A camera without position has in view what all of --frames reach.
 ///
 /// With --reproject forward a frame begins with samples of the one before, and so depends on all before it. The first frame that is
 /// asked for, and one after a frame that failed, begins anew: --only 40..48 is the same sequence begun at frame 40. A run that goes
@@ -212,13 +212,14 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut preview = args.preview.as_ref().map(|_| Preview::default());
     let (numbers, mut reports) = (args.numbers(stage.frames())?, Vec::new());
     let ended = render_frames(args, &mut stage, numbers, preview.as_mut(), &mut reports);
-    let interrupted = ended.as_ref().is_ok_and(Option::is_some);
-    if let Ok(line) = &ended {
-        interrupt::leave_at_once(line.as_deref().unwrap_or("interrupted: all frames are finished"));
+    if let Ok(end) = &ended {
+        interrupt::leave_at_once(end.line().unwrap_or("interrupted: all frames are finished"));
     }
+    let interrupted = matches!(ended, Ok(End::Interrupted(_)));
     let mut shown = Vec::new();
-    if let (Ok(line), Some(preview), Some(path)) = (&ended, &preview, &args.preview) {
-        shown = preview.save(path, args.fps, line.is_none())?;
+    // What takes no frames takes no preview of them either.
+    if let (Ok(End::Finished | End::Interrupted(_)), Some(preview), Some(path)) = (&ended, &preview, &args.preview) {
+        shown = preview.save(path, args.fps, !interrupted)?;
     }
     let failed = reports.iter().filter(|report| report.error.is_some()).count();
     let (seconds, device) = (begun.elapsed().as_secs_f64(), stage.gpu().info().name.clone());
@@ -226,18 +227,35 @@ pub fn run(args: &Args) -> Result<Exit> {
         let warnings = stage.warnings().to_vec();
         print_json(&Summary { frames: reports, failed, interrupted, seconds, device, warnings })?;
     }
-    let interrupted = ended?;
+    let end = ended?;
     fail_on_messages(stage.gpu())?;
     let preview: String = shown.iter().map(|path| format!("; {} shows those before", path.display())).collect();
-    interrupted.iter().for_each(|line| complain(&(line.clone() + &preview)));
-    Ok(match interrupted {
-        Some(_) => Exit::Interrupted,
-        None if failed == 0 => Exit::Done,
-        None => Exit::PartlyFailed,
+    end.line().iter().for_each(|line| complain(&format!("{line}{preview}")));
+    Ok(match end {
+        End::Interrupted(_) => Exit::Interrupted,
+        End::Finished if failed == 0 => Exit::Done,
+        End::Finished | End::Unwritable(_) => Exit::PartlyFailed,
     })
 }
 
-/// Renders frames until all are there or a signal comes: what is said of that then.
+/// Why no more frames are rendered, and what is said of that.
+enum End {
+    Finished,
+    Interrupted(String),
+    Unwritable(String),
+}
+
+impl End {
+    fn line(&self) -> Option<&str> {
+        match self {
+            Self::Finished => None,
+            Self::Interrupted(line) | Self::Unwritable(line) => Some(line),
+        }
+    }
+}
+
+/// Renders frames until all are there, a signal comes, or two in a row cannot be written: a full disk, or a folder that has gone,
+/// takes none of those after them either.
 ///
 /// # Errors
 /// The loss of the device.
@@ -247,39 +265,51 @@ fn render_frames(
     numbers: Range<u32>,
     mut preview: Option<&mut Preview>,
     reports: &mut Vec<FrameReport>,
-) -> Result<Option<String>> {
+) -> Result<End> {
+    let mut lost = false;
     for number in numbers.clone() {
         let line = interruption(args, &format!("in frame {number}"));
         match reports.is_empty() {
             // Nothing is there to be told yet, and to compile the first frame's kernels may take long.
             true if interrupt::leave_at_once(&line) => interrupt::leave(&line),
-            false if interrupt::flag().load(Ordering::SeqCst) => return Ok(Some(line)),
+            false if interrupt::flag().load(Ordering::SeqCst) => return Ok(End::Interrupted(line)),
             _ => {}
         }
         let (report, result) = stage.frame(number, preview.as_deref_mut());
         match result {
-            Err(lost @ Error::DeviceLost(_)) => {
+            Err(error @ Error::DeviceLost(_)) => {
                 reports.push(report);
-                return Err(lost);
+                return Err(error);
             }
-            Ok(Exit::Interrupted) => return Ok(Some(line)),
+            Ok(Exit::Interrupted) => return Ok(End::Interrupted(line)),
             _ => {}
         }
-        tell(args, &report, numbers.end - number - 1, reports);
+        let left = numbers.end - number - 1;
+        tell(args, &report, left, reports);
         reports.push(report);
+        let lost_before = std::mem::replace(&mut lost, matches!(result, Err(Error::Output { .. })));
+        if lost && lost_before && left > 0 {
+            let why =
+                format!("error: frames {} and {number} could not be written, so that no more are rendered", number - 1);
+            return Ok(End::Unwritable(format!("{why}: {}", what_stays(args))));
+        }
     }
-    Ok(None)
+    Ok(End::Finished)
 }
 
 /// What an interruption at this place says.
 pub fn interruption(args: &Args, place: &str) -> String {
-    let how = match args.render.output_files().iter().any(|path| image::has_layers(path)) {
+    format!("interrupted {place}: {}", what_stays(args))
+}
+
+/// What becomes of finished frames, and how to go on.
+fn what_stays(args: &Args) -> &'static str {
+    match args.render.output_files().iter().any(|path| image::has_layers(path)) {
         // Of other files nothing tells which samples they hold.
         false => "finished frames stay, but are rendered anew unless -o NAME.####.exr is given too",
         true if args.again => "finished frames stay, and the same command without --again goes on there",
         true => "finished frames stay, and the same command goes on there",
-    };
-    format!("interrupted {place}: {how}")
+    }
 }
 
 /// One line for a frame; a failure is always told.
