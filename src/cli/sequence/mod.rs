@@ -28,7 +28,8 @@ use std::time::{Duration, Instant};
 /// Frame n shows the scene n / fps seconds after the start of its `[[animation]]` tables. Files have `####` for the number of the
 /// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose, settings and filter is not rendered
 /// again; its other pictures are written anew. A frame that fails, or cannot be written, does not stop the others, but two in a row
-/// that cannot be written do: the exit code is 6 then, and the same command renders them again. A camera without position has in view what all of --frames reach.
+/// that cannot be written do: the exit code is 6 then, and the same command renders them again. A camera without position has in view
+/// what all of --frames reach.
 ///
 /// With --reproject forward a frame begins with samples of the one before, and so depends on all before it. The first frame that is
 /// asked for, and one after a frame that failed, begins anew: --only 40..48 is the same sequence begun at frame 40. A run that goes
@@ -266,7 +267,7 @@ fn render_frames(
     mut preview: Option<&mut Preview>,
     reports: &mut Vec<FrameReport>,
 ) -> Result<End> {
-    let mut lost = false;
+    let mut unwritten = false;
     for number in numbers.clone() {
         let line = interruption(args, &format!("in frame {number}"));
         match reports.is_empty() {
@@ -287,8 +288,8 @@ fn render_frames(
         let left = numbers.end - number - 1;
         tell(args, &report, left, reports);
         reports.push(report);
-        let lost_before = std::mem::replace(&mut lost, matches!(result, Err(Error::Output { .. })));
-        if lost && lost_before && left > 0 {
+        let last_unwritten = std::mem::replace(&mut unwritten, matches!(result, Err(Error::Output { .. })));
+        if unwritten && last_unwritten && left > 0 {
             let why =
                 format!("error: frames {} and {number} could not be written, so that no more are rendered", number - 1);
             return Ok(End::Unwritable(format!("{why}: {}", what_stays(args))));
