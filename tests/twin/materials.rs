@@ -381,6 +381,7 @@ fn an_orthographic_camera_agrees_with_its_twin() {
     assert!(effects.orthographic && !called_for(&view(None), &scene.settings, outputs).orthographic);
     let pair = run(&gpu, &scene, effects);
     check("orthographic", &pair);
+    check("orthographic, all effects", &run_with_all_effects(&gpu, &scene));
     // Control: in perspective the picture is another.
     let others = run(&gpu, &view(None), Effects { orthographic: false, ..effects }).samples;
     assert!(agreement(&[others[0].clone(), pair.samples[1].clone()]) < agreement(&pair.samples) - 0.1, "control");
