@@ -99,14 +99,15 @@ uint choose_light(Receiver r, inout uint word, out float probability) {
     uint hash = pcg(word), end = LightNode_child(light_nodes, 0u), light = 0u;
     float before = LightNode_power(light_nodes, 0u);
     probability = before;
-    if (u < before) return choose_by_tree(r, min(u / before, BELOW_ONE), hash, probability);
+    float digits = UNIT_STEP * unit_interval(hash); // below those of `u`, in place of those that the choice uses up
+    if (u < before) return choose_by_tree(r, min((u + digits) / before, BELOW_ONE), pcg(hash), probability);
     probability = 0.0;
     for (uint i = 1u; i < end; i++) {
         LightNode outside = LightNode_load(light_nodes, i);
         if (outside.power > 0.0 && u >= before) {
             light = outside.child & ~LIGHT_LEAF;
             probability = outside.power;
-            word = word_of_unit((u - before) / outside.power, hash);
+            word = word_of_unit((u - before + digits) / outside.power, hash);
         }
         before += outside.power;
     }

@@ -140,15 +140,15 @@ pub struct Choice {
 /// The light that `word` chooses, in a scene with a tree.
 pub fn choose_light(scene: &Scene, r: &Receiver, word: u32) -> Choice {
     let (u, hash, root) = (unit_interval(word), pcg(word), &scene.light_nodes[0]);
-    let mut before = root.power;
+    let (mut before, digits) = (root.power, UNIT_STEP * unit_interval(hash));
     if u < before {
-        let (light, probability) = choose_by_tree(scene, r, (u / before).min(BELOW_ONE), hash);
+        let (light, probability) = choose_by_tree(scene, r, ((u + digits) / before).min(BELOW_ONE), pcg(hash));
         return Choice { light, rest: word, probability: before * probability };
     }
     let mut chosen = Choice { light: 0, rest: word, probability: 0.0 };
     for outside in &scene.light_nodes[1..root.child as usize] {
         if outside.power > 0.0 && u >= before {
-            let rest = word_of_unit((u - before) / outside.power, hash);
+            let rest = word_of_unit((u - before + digits) / outside.power, hash);
             chosen = Choice { light: outside.child & !LIGHT_LEAF, rest, probability: outside.power };
         }
         before += outside.power;

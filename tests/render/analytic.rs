@@ -322,6 +322,41 @@ fn sun_and_sky_of_one_colour_leave_no_noise_on_open_ground() {
     }
 }
 
+/// Ground under a sky of 1 whose sun, of 4 x 4 texels, brings as much light again, beside four triangles that hardly shine: those make lights
+/// be chosen by a tree, and texels of so large a sky are told apart by the last digits of a word. From height `h` and extent `w`, one texel
+/// of value v at the polar angle t brings v cos(t) sin(t) (2 pi / w) (pi / h) to the irradiance.
+#[test]
+fn the_sun_of_a_large_sky_shines_as_much_beside_lamps() {
+    const WIDTH: u32 = 2048;
+    const HEIGHT: u32 = 1024;
+    let rows = 254..258;
+    let share = |row: u32| {
+        let polar = PI * (f64::from(row) + 0.5) / f64::from(HEIGHT);
+        4.0 * polar.cos() * polar.sin() * 2.0 * PI / f64::from(WIDTH) * PI / f64::from(HEIGHT)
+    };
+    let sun = PI / rows.clone().map(share).sum::<f64>();
+    let light = |x: u32, y: u32| if rows.contains(&y) && (700..704).contains(&x) { 1.0 + sun as f32 } else { 1.0 };
+    let lamps: String = [-3.0, 3.0]
+        .map(|x| {
+            let place = format!("{{ scale = 0.01, translate = [{x:?}, 1.0, 0.0] }}");
+            format!("[[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\ntransform = {place}\n")
+        })
+        .concat();
+    let scene = Workplace::new().sky("sky.exr", WIDTH, HEIGHT, light).scene(&format!(
+        "[film]\nwidth = {SIDE}\nheight = {SIDE}\n[camera]\nposition = [0.0, 4.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n\
+         up = [0.0, 0.0, -1.0]\nfov = 40.0\n[render]\nspp = 64\nmax_depth = 2\n[environment]\nfile = 'sky.exr'\n\
+         [[material]]\nname = 'lamp'\nemission = 0.001\n[[material]]\nname = 'ground'\ncolor = {ALBEDO}\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'ground'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 5.0 }}\n\
+         {lamps}"
+    ));
+    assert!(scene.has_light_tree());
+    let (mean, variance) = mean_and_variance(&rendered(&scene));
+    let error = (variance / f64::from(64 * SIDE * SIDE)).sqrt();
+    println!("mean {mean} to {error}");
+    assert!(error < 0.005, "{error}");
+    assert!((mean - 2.0 * ALBEDO).abs() < 4.0 * error, "{mean} to {error}");
+}
+
 /// A cube whose twelve triangles shine with 1 and reflect half: each point shows 1 + 1/2, since light comes to it from all of its
 /// hemisphere. The cosine alone chooses directions that all bring the same, and light samples of lamps nearby must not outweigh them.
 #[test]

@@ -10,7 +10,7 @@ use tallow::scene::Loaded;
 use tallow::shaders::shared::light::EVEN_SHARE;
 use tallow::shaders::shared::light_tree::CHILDREN;
 use tallow::twins::light::*;
-use tallow::twins::light_tree::{brought_by, choose_by_tree};
+use tallow::twins::light_tree::{Choice, brought_by, choose_by_tree, choose_light};
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 use tallow::twins::scene::triangle_vertices;
 use tallow::twins::surface::{Surface, surface_at, surface_emission};
@@ -386,6 +386,36 @@ fn what_is_left_of_a_choice_is_independent_of_it() {
     assert!(found > sidak(1), "{found:.1e}");
     let word_itself = p(&|word| (alias_choose(table, word).0, word));
     assert!(word_itself < sidak(1), "control: the word that chose");
+}
+
+/// Large skies read all digits of the word that a choice leaves them: without one of them, every second of some texels is never drawn.
+#[test]
+fn a_sky_beside_a_tree_gets_a_word_of_even_digits() {
+    let lamps: Vec<_> = (0..8).map(|i| corners(i, Vec3::ONE)).collect();
+    for (emission, share) in [(1e6, 0.25), (1e-6, 0.5)] {
+        let place = Workplace::new().obj("lamps.obj", &lamps).sky("sky.exr", 4, 2, |_, _| 1.0);
+        let scene = place.scene(&format!(
+            "[environment]\nfile = 'sky.exr'\n[[material]]\nname = 'a'\nemission = {emission}\n\
+             [[mesh]]\nfile = 'lamps.obj'\nmaterial = 'a'\n"
+        ));
+        assert!(scene.has_light_tree());
+        let choices = words().map(|word| choose_light(&scene, &receivers()[0], word));
+        let is_sky = |choice: &Choice| scene.lights[choice.light as usize].kind == LIGHT_ENVIRONMENT;
+        let rests: Vec<u32> = choices.filter(is_sky).map(|choice| choice.rest).collect();
+        let drawn = rests.len() as f64 / f64::from(WORDS);
+        assert!((drawn - share).abs() < 1e-4, "a share of {drawn}, where even digits are hardest to get at {share}");
+        let uneven = |digits: &dyn Fn(u32) -> usize| {
+            let mut observed = [0.0; 16];
+            rests.iter().for_each(|&rest| observed[digits(rest)] += 1.0);
+            chi_square(&observed, &[rests.len() as f64 / 16.0; 16])
+        };
+        for shift in (0..32).step_by(4) {
+            let p = uneven(&|rest| (rest >> shift & 15) as usize);
+            assert!(p > sidak(16), "{share}, from bit {shift}: {p:.1e}");
+            let stuck = uneven(&|rest| (rest >> shift & 15 | 1) as usize);
+            assert!(stuck < sidak(16), "control: a digit that is always 1, from bit {shift}");
+        }
+    }
 }
 
 fn variance(scene: &Loaded, independent: bool) -> f64 {
