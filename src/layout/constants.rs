@@ -44,6 +44,8 @@ constants! {
     MATERIAL_EMITS_BEHIND: uint = 64;
     /// [`Material::flags`]: a smooth thin wall without a coat, which shadow rays of lights without extent pass.
     MATERIAL_CLEAR_WALL: uint = 128;
+    /// [`Material::flags`]: opacities of vertices, of which some are below 1, are part of its mask.
+    MATERIAL_VERTEX_MASK: uint = 256;
     /// [`PathConstants::pixel_filter`]: uniform over the pixel.
     PIXEL_FILTER_BOX: uint = 0;
     /// [`PathConstants::pixel_filter`]: triangle of radius 1 pixel.

@@ -2,7 +2,7 @@
 use crate::gltf_file::{data, floats, triangle};
 use serde_json::{Value, json};
 use std::path::Path;
-use tallow::layout::LIGHT_POINT;
+use tallow::layout::{LIGHT_POINT, MATERIAL_MASKED};
 use tallow::scene::{Loaded, Scene};
 
 /// A model of a textured triangle that moves along x from time 0 to time 2 and of one that stays, with a lamp.
@@ -57,6 +57,11 @@ fn parse(folder: &Path, text: &str) -> Result<Loaded, String> {
 
 /// Corners of all that is placed, in the world, in tenths.
 fn corners(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
+    placed(scene).into_iter().map(|(corners, _)| corners).collect()
+}
+
+/// The same, with its material.
+fn placed(scene: &Scene) -> Vec<([[i32; 3]; 3], u32)> {
     let tenths = |p: [f32; 3]| p.map(|v| (v * 10.0).round() as i32);
     let mut found = Vec::new();
     for i in &scene.instances {
@@ -65,7 +70,7 @@ fn corners(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
         // A mesh is one triangle, of which the root of its instance tells.
         let node = &scene.nodes[i.root as usize];
         let t = &scene.triangles[node.primitive_base as usize];
-        found.push([t.v0, t.v1, t.v2].map(world));
+        found.push(([t.v0, t.v1, t.v2].map(world), t.material));
     }
     found.sort_unstable();
     found
@@ -159,6 +164,41 @@ fn keys_move_nodes_of_a_model_and_what_hangs_on_them() {
     refused(&instance, "is placed by instances without a name: a part of a glTF file is moved by `node`");
 }
 
+/// Many files are called scene.gltf; one may be placed by several tables. Instances and keys mean the first of a name.
+#[test]
+fn models_of_one_name_stay_apart() {
+    let folder = folder();
+    let mut json = model();
+    json["nodes"][1]["translation"] = json!([0, 50, 0]);
+    json["materials"][0]["emissiveFactor"] = json!([0, 0, 1]);
+    std::fs::create_dir(folder.path().join("others")).unwrap();
+    std::fs::write(folder.path().join("others/fox.gltf"), json.to_string()).unwrap();
+    image::RgbImage::new(3, 1).save(folder.path().join("others/tex.png")).unwrap();
+    let table =
+        |file: &str, x: u32| format!("[[mesh]]\nfile = '{file}/fox.gltf'\ntransform = {{ translate = [{x}, 0, 0] }}\n");
+    let tables = [table("models", 0), table("others", 10), table("models", 20)].concat();
+    // What moves is apart; all that stays is one mesh.
+    let moving = |scene: &Scene| -> Vec<_> { corners(scene).into_iter().map(|t| t[0]).skip(1).collect() };
+    let stays = |scene: &Scene, at: [f32; 3]| scene.triangles.iter().any(|t| t.v0 == at);
+    let mut loaded = parse(folder.path(), &tables).unwrap();
+    assert_eq!((loaded.triangles.len(), moving(&loaded)), (6, vec![[0, 0, 0], [100, 0, 0], [200, 0, 0]]));
+    for at in [[0.0; 3], [10.0, 50.0, 0.0], [20.0, 0.0, 0.0]] {
+        assert!(stays(&loaded, at), "{at:?}");
+    }
+    assert_eq!(loaded.materials.iter().filter(|m| m.emission == [1.0; 3]).count(), 2);
+    let blue = loaded.materials.iter().position(|m| m.emission == [0.0, 0.0, 1.0]).unwrap() as u32;
+    let wears_blue = |(corners, material): ([[i32; 3]; 3], u32)| (corners[0][0], material == blue);
+    let worn: Vec<_> = placed(&loaded).into_iter().skip(1).map(wears_blue).collect();
+    assert_eq!(worn, [(0, false), (100, true), (200, false)], "each is its own");
+    let pose = loaded.animation.at(1.0).unwrap();
+    loaded.scene.apply(&pose).unwrap();
+    assert_eq!(moving(&loaded), [[20, 0, 0], [120, 0, 0], [220, 0, 0]]);
+    let instance = "[[instance]]\nmesh = 'fox'\ntransform = { translate = [0, 0, 7] }\n";
+    let loaded = parse(folder.path(), &format!("{tables}{instance}")).unwrap();
+    assert_eq!(loaded.triangles.len(), 6);
+    assert!(stays(&loaded, [10.0, 50.0, 0.0]) && stays(&loaded, [20.0, 0.0, 0.0]) && !stays(&loaded, [20.0, 0.0, 7.0]));
+}
+
 #[test]
 fn what_a_model_cannot_have_is_named() {
     let folder = folder();
@@ -188,4 +228,37 @@ fn a_ply_file_is_a_mesh_and_a_scene() {
     assert_eq!(alone.texels[..2], [0xffff, 0xffff_0000], "red, opaque");
     let loaded = parse(folder.path(), "[[mesh]]\nfile = 'leaf.ply'\n").unwrap();
     assert_eq!(loaded.triangles, alone.triangles);
+}
+
+#[test]
+fn opacities_of_ply_vertices_make_holes_where_a_material_takes_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+               0 0 0 9 9 9 255\n1 0 0 9 9 9 0\n0 1 0 9 9 9 0\n3 0 1 2\n";
+    std::fs::write(folder.path().join("fading.ply"), ply).unwrap();
+    std::fs::write(folder.path().join("opaque.ply"), ply.replace(" 9 0\n", " 9 255\n")).unwrap();
+    for (file, mode, masked) in [
+        ("fading", "alpha_mode = 'mask'", true),
+        ("fading", "alpha_mode = 'blend'", true),
+        ("fading", "alpha_mode = 'opaque'", false),
+        ("fading", "alpha_mode = 'mask'\nalpha_cutoff = 0.0", false),
+        ("fading", "", false),
+        ("opaque", "alpha_mode = 'blend'", false),
+    ] {
+        let text = format!(
+            "[[material]]\nname = 'm'\ntype = 'metallic-roughness'\n{mode}\n\
+             [[mesh]]\nfile = '{file}.ply'\nmaterial = 'm'\n[[light]]\ntype = 'point'\nintensity = 1\nposition = [0, 0, 3]\n\
+             [[animation]]\nmaterial = 'm'\nkeys = [{{ time = 0, opacity = 1 }}, {{ time = 1, opacity = 0.5 }}]\n"
+        );
+        let mut loaded = parse(folder.path(), &text).unwrap();
+        let is_masked = |scene: &Scene| scene.materials[0].flags & MATERIAL_MASKED != 0;
+        assert_eq!(is_masked(&loaded), masked, "{file}, {mode}");
+        // An opacity of 1 leaves the holes of vertices, whatever it was before.
+        for (time, expected) in [(0.0, masked), (1.0, true), (0.0, masked)] {
+            let pose = loaded.animation.at(time).unwrap();
+            loaded.scene.apply(&pose).unwrap();
+            assert_eq!(is_masked(&loaded), expected, "{file}, {mode}, at {time} s");
+        }
+    }
 }

@@ -77,8 +77,6 @@ impl<'a> Sources<'a> {
     }
 
     fn add_materials(&mut self) -> Result<()> {
-        let mut colors = self.description.mesh.iter().flat_map(|m| m.data.iter().flat_map(|mesh| &mesh.colors));
-        self.library.materials.vertices_have_alpha = colors.any(|c| c[3] < 1.0);
         for table in &self.description.material {
             let place = format!("material \"{}\"", table.name);
             let directory = self.directory();
@@ -107,6 +105,11 @@ impl<'a> Sources<'a> {
                 let parsed = mesh_file::load(&path, Numbering::Shared, &mut self.library)?;
                 self.files.insert(path, parsed);
             }
+        }
+        let given = self.description.mesh.iter().filter_map(|mesh| mesh.data.as_ref());
+        let read = self.files.values().flat_map(|file| &file.parts).map(|part| &*part.mesh);
+        if given.chain(read).any(|mesh| mesh.colors.iter().any(|color| color[3] < 1.0)) {
+            self.library.materials.mask_by_vertices();
         }
         Ok(())
     }

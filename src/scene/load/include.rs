@@ -20,33 +20,39 @@ pub type Included<'a> = (Cow<'a, Description>, Vec<Arc<dyn Mover>>, Vec<String>)
 /// [`Error::Input`] for what is wrong with a file, and for keys of its table that it cannot have.
 pub fn models<'a>(path: &Path, from: &'a Description) -> Result<Included<'a>> {
     let is_model = |table: &MeshTable| table.file.as_deref().is_some_and(|file| Format::of(file) == Format::Gltf);
-    let mut keys = keys_of_nodes(path, from, |name| named(from, name).is_some_and(is_model))?;
+    // Of a name, the first mesh.
+    let named: HashMap<_, _> = from.mesh.iter().enumerate().rev().filter_map(|(i, m)| Some((name_of(m)?, i))).collect();
+    let names_model = |name: &str| named.get(name).is_some_and(|&number| is_model(&from.mesh[number]));
+    let mut keys = keys_of_nodes(path, from, names_model)?;
     if !from.mesh.iter().any(is_model) {
         return Ok((Cow::Borrowed(from), Vec::new(), Vec::new()));
     }
-    let whole = |instance: &&InstanceTable| !named(from, &instance.mesh).is_some_and(is_model);
-    let instance = from.instance.iter().filter(whole).cloned().collect();
+    let (of_models, instance): (Vec<_>, Vec<_>) = from.instance.iter().cloned().partition(|i| names_model(&i.mesh));
+    let mut instances: HashMap<_, Vec<_>> = HashMap::new();
+    of_models.iter().for_each(|instance| instances.entry(&*instance.mesh).or_default().push(instance));
     let mut to = Description { mesh: Vec::new(), instance, ..from.clone() };
     let (mut movers, mut warnings) = (Vec::new(), Vec::new());
-    for table in &from.mesh {
+    for (number, table) in from.mesh.iter().enumerate() {
         if !is_model(table) {
             to.mesh.push(table.clone());
             continue;
         }
-        let place = Place::new(path, table, from)?;
+        let mut name = name_of(table).unwrap_or_default();
+        let (mut placed, mut keyed) = (Vec::new(), Vec::new());
+        if named.get(&name) == Some(&number) {
+            placed = instances.remove(&*name).unwrap_or_default();
+            keyed = keys.remove(&name).unwrap_or_default();
+        } else {
+            name = format!("{name}#{}", number + 1);
+        }
+        let place = Place::new(path, table, name, &placed)?;
         let directory = path.parent().unwrap_or(Path::new(""));
         let file = table.file.as_ref().map(|file| file.to_string_lossy().replace('\\', "/")).unwrap_or_default();
-        let keys = keys.remove(&place.name).unwrap_or_default();
-        let mut model = gltf::load(&directory.join(file), directory, table.clip.as_deref(), keys)?;
+        let mut model = gltf::load(&directory.join(file), directory, table.clip.as_deref(), keyed)?;
         warnings.append(&mut model.warnings);
         movers.extend(place.add(model, from, &mut to));
     }
     Ok((Cow::Owned(to), movers, warnings))
-}
-
-/// The first mesh of a name.
-fn named<'a>(from: &'a Description, name: &str) -> Option<&'a MeshTable> {
-    from.mesh.iter().find(|table| name_of(table).as_deref() == Some(name))
 }
 
 /// By the name of a glTF file's mesh: the keys of animation tables that move its nodes, by their names.
@@ -74,6 +80,7 @@ fn name_of(table: &MeshTable) -> Option<String> {
 /// The table of a glTF file, and where it puts what is in it.
 struct Place<'a> {
     table: &'a MeshTable,
+    /// What the names of its parts begin with: no other table's do.
     name: String,
     /// Each with the material in place of all others.
     copies: Vec<(DAffine3, Option<String>)>,
@@ -82,15 +89,14 @@ struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    fn new(path: &Path, table: &'a MeshTable, from: &Description) -> Result<Self> {
-        let name = name_of(table).unwrap_or_default();
+    fn new(path: &Path, table: &'a MeshTable, name: String, instances: &[&InstanceTable]) -> Result<Self> {
         if table.group.is_some() || table.segments.is_some() {
             let what = "is a glTF file, which has neither group nor segments: it is taken whole";
             return Err(Error::input_at(path, format!("mesh \"{name}\""), what));
         }
         let own = table.transform.0;
-        let of = |instance: &InstanceTable| (instance.transform.0 * own, instance.material.clone());
-        let mut copies: Vec<_> = from.instance.iter().filter(|i| i.mesh == name).map(of).collect();
+        let of = |instance: &&InstanceTable| (instance.transform.0 * own, instance.material.clone());
+        let mut copies: Vec<_> = instances.iter().map(of).collect();
         let instanced = !copies.is_empty();
         if !instanced {
             copies.push((own, None));
@@ -101,9 +107,8 @@ impl<'a> Place<'a> {
     /// Adds what a file holds to a description; returns what moves it.
     fn add(&self, model: Model, from: &Description, to: &mut Description) -> Option<Arc<dyn Mover>> {
         let Model { description, mover, .. } = model;
-        let known = |to: &Description, name: &Path| to.bitmap.iter().any(|bitmap| bitmap.name == name);
-        let bitmaps: Vec<_> = description.bitmap.into_iter().filter(|b| !known(to, &b.name)).collect();
-        to.bitmap.extend(bitmaps);
+        let known: HashSet<_> = to.bitmap.iter().map(|bitmap| bitmap.name.clone()).collect();
+        to.bitmap.extend(description.bitmap.into_iter().filter(|bitmap| !known.contains(&bitmap.name)));
         let materials = self.add_materials(description.material, from, to);
         let placed: HashSet<_> = description.instance.iter().map(|instance| instance.mesh.clone()).collect();
         let meshes = to.mesh.len();
@@ -140,10 +145,12 @@ impl<'a> Place<'a> {
         to: &mut Description,
     ) -> HashMap<String, String> {
         let mut names = HashMap::new();
-        for mut table in tables.into_iter().filter(|t| !from.material.iter().any(|own| own.name == t.name)) {
+        let own: HashSet<_> = from.material.iter().map(|table| &table.name).collect();
+        let mut taken: HashSet<_> = to.material.iter().map(|table| table.name.clone()).collect();
+        for mut table in tables.into_iter().filter(|table| !own.contains(&table.name)) {
             let asked = table.name.clone();
-            if to.material.iter().any(|other| other.name == asked) {
-                table.name = self.of(&asked);
+            while !taken.insert(table.name.clone()) {
+                table.name = self.of(&table.name);
             }
             names.insert(asked, table.name.clone());
             to.material.push(table);

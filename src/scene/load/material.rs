@@ -21,8 +21,8 @@ pub struct Materials {
     pub textures: TextureSet,
     /// Materials whose bump height is a share of the scene's size, which is known last.
     pub default_bumps: Vec<u32>,
-    /// Whether some mesh has vertices of an opacity below 1.
-    pub vertices_have_alpha: bool,
+    /// Those for which opacities of vertices count.
+    pub take_vertex_alpha: Vec<u32>,
 }
 
 /// Marks smooth thin walls without a coat, which shadow rays of lights without extent pass.
@@ -33,7 +33,8 @@ pub fn mark_clear_wall(m: &mut Material) {
 
 /// Whether its opacity may let rays pass.
 pub fn is_masked(m: &Material) -> bool {
-    m.kind != BSDF_DIELECTRIC && (m.opacity < 1.0 || m.opacity_texture != NONE)
+    let partly = m.opacity < 1.0 || m.opacity_texture != NONE || m.flags & MATERIAL_VERTEX_MASK != 0;
+    m.kind != BSDF_DIELECTRIC && (partly || m.alpha_cutoff > 1.0)
 }
 
 /// Whether it is a thin wall that lets light straight through.
@@ -78,6 +79,13 @@ impl Materials {
         self.list.push(material);
         self.names.push(name.to_owned());
         self.list.len() as u32 - 1
+    }
+
+    /// Says that some vertices have an opacity below 1.
+    pub fn mask_by_vertices(&mut self) {
+        for &index in &self.take_vertex_alpha {
+            self.list[index as usize].flags |= MATERIAL_VERTEX_MASK | MATERIAL_MASKED;
+        }
     }
 
     /// Adds a `[[material]]`.

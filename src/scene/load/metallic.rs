@@ -51,7 +51,11 @@ impl Materials {
         if table.unlit {
             make_unlit(&mut m);
         }
-        Ok(self.push(&table.name, m))
+        let index = self.push(&table.name, m);
+        if takes_alpha(table) {
+            self.take_vertex_alpha.push(index);
+        }
+        Ok(index)
     }
 
     fn texture(&mut self, s: &mut Source, texture: &Option<TextureTable>, kind: Kind) -> Result<u32, String> {
@@ -108,11 +112,15 @@ impl Materials {
             (None, Some(_)) => self.texture(s, &t.color_texture, Kind::Alpha)?,
             (None, None) => NONE,
         };
-        // Vertices may have an alpha below 1 where nothing else has.
-        if t.alpha_mode.is_some() && (self.vertices_have_alpha || cutoff > 1.0) {
-            m.flags |= MATERIAL_MASKED;
-        }
         Ok(())
+    }
+}
+
+/// Whether alpha makes holes: that of a mask does whose cutoff is above 0.
+fn takes_alpha(t: &MaterialTable) -> bool {
+    match t.alpha_mode {
+        Some(AlphaMode::Mask) => t.alpha_cutoff.is_none_or(|cutoff| cutoff > 0.0),
+        mode => mode == Some(AlphaMode::Blend),
     }
 }
 
