@@ -80,7 +80,7 @@ pub fn judged(runs: &[OtherRun], reference: &Reference) -> Vec<(Point, Option<Pi
 }
 
 fn one(run: &OtherRun, reference: &Reference) -> Result<(Run, Picture)> {
-    let picture = image::read(&run.image)?.picture(None).map_err(|what| Error::input(&run.image, what))?;
+    let picture = image::read(&run.image)?.rec709(None).map_err(|what| Error::input(&run.image, what))?;
     let [size, wanted] = [&picture, &reference.picture].map(|picture| [picture.width, picture.height]);
     if size != wanted {
         let what = format!("is {}x{}, but {}x{} is measured", size[0], size[1], wanted[0], wanted[1]);
@@ -138,6 +138,23 @@ mod tests {
         assert!(one(&run(good), &reference).is_ok());
         let line = one(&run(bad), &reference).unwrap_err().to_string();
         assert!(line.contains("bad.exr") && line.contains("1 of 1 pixels"), "{line}");
+    }
+
+    #[test]
+    fn images_in_other_primaries_are_compared_in_those_of_rec_709() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("wide.exr");
+        let mut film = Film::from(&Picture { width: 1, height: 1, pixels: vec![[0.2, 0.5, 0.7]] });
+        film.primaries = Some([[0.708, 0.292], [0.17, 0.797], [0.131, 0.046], [0.3127, 0.329]]); // Rec. 2020
+        image::write(&path, &film, &WriteOptions::default()).unwrap();
+        let expected = film.rec709(None).unwrap();
+        assert_ne!(expected.pixels, film.picture(None).unwrap().pixels);
+        let reference = reference::read(&path, [1, 1], None).unwrap();
+        let run = OtherRun { image: path, ..table(TABLE).unwrap().remove(0) };
+        for picture in [&reference.picture, &one(&run, &reference).unwrap().1] {
+            let off = |i: usize| (picture.pixels[0][i] - expected.pixels[0][i]).abs();
+            assert!((0..3).all(|i| off(i) < 1e-3), "{:?}, not {:?}", picture.pixels, expected.pixels);
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@ use super::document::{NoiseKind, ReferenceInfo, ReferenceSource};
 use super::judge::Noise;
 use crate::error::{Error, Result};
 use crate::image::metrics;
+use crate::image::primaries::is_rec709;
 use crate::image::{self, Film, Picture};
 use crate::render::provenance::Provenance;
 use crate::render::settings::Settings;
@@ -35,7 +36,7 @@ pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings)>) -> 
         );
         return Err(wrong(what));
     }
-    let picture = film.picture(None).and_then(Picture::finite).map_err(wrong)?;
+    let picture = film.rec709(None).and_then(Picture::finite).map_err(wrong)?;
     let provenance = Provenance::of(&film).ok();
     let mut notes = Vec::new();
     if let (Some(provenance), Some((scene, settings))) = (&provenance, shows) {
@@ -58,8 +59,11 @@ pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings)>) -> 
     })
 }
 
-/// Upper bound of a file's noise, from its layer of variances.
+/// Upper bound of a file's noise, from its layer of variances, which is not known in other primaries than the file's.
 fn bound(film: &Film, picture: &Picture) -> Option<Noise> {
+    if film.primaries.is_some_and(|own| !is_rec709(&own)) {
+        return None;
+    }
     let variance = film.picture(Some("variance")).ok().filter(|variance| variance.non_finite() == 0)?;
     let noise = noise_of(picture, &variance.pixels);
     (noise.mse > 0.0).then_some(noise)

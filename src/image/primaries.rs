@@ -34,7 +34,8 @@ pub(super) fn to_exr(primaries: Primaries) -> Chromaticities {
     Chromaticities { red, green, blue, white }
 }
 
-fn is_rec709(primaries: &Primaries) -> bool {
+/// Whether they are those of Rec. 709, to the digits that files have.
+pub fn is_rec709(primaries: &Primaries) -> bool {
     let pairs = primaries.as_flattened().iter().zip(REC709.as_flattened());
     pairs.into_iter().all(|(a, b)| (a - b).abs() < ALIKE)
 }
