@@ -119,6 +119,13 @@ fn ctrl_c_is_heard_while_a_filter_runs() {
         &["the noisy image was written to a.exr,", "--denoise was not finished; --resume a.exr filters it"],
     );
     assert_eq!(names(folder.path()), ["a.exr"], "what the filter makes, or leaves as it is, is written once");
+    // No more can be made of a picture alone: a checkpoint stays until the filter is done.
+    let other = tempfile::tempdir().unwrap();
+    let mut running = start(&other, &format!("{words} --denoise auto --checkpoint 1000 -o b.png"));
+    running.until_there_is("b.partial.exr");
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["written to b.png, b.partial.exr,", "--resume b.partial.exr filters it"]);
+    assert_eq!(names(other.path()), ["b.partial.exr", "b.png"]);
     let noisy = film(&folder, "a.exr");
     assert!(noisy.channel("Noisy Image.R").is_none() && noisy.channel("pending").is_none());
     let mut running = start(&folder, "filter a.exr --filter auto --quiet -o b.exr");

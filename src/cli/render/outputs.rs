@@ -62,6 +62,22 @@ pub fn save(
     written
 }
 
+/// Writes the one image from before a filter runs, which is that of [`before_filter`] if there is one. Where it lacks layers, a checkpoint holds what the filter
+/// and further samples need, until all is written.
+pub fn save_noisy(
+    item: &[Item],
+    film: &Film,
+    files: &mut Files,
+    checkpoint: &mut Option<CheckpointFile>,
+) -> Vec<PathBuf> {
+    if item.iter().any(|item| image::has_layers(&item.path)) {
+        return save(item, film, files, checkpoint.take(), true);
+    }
+    let mut written = save(item, film, files, None, true);
+    written.extend(checkpoint.as_mut().and_then(|checkpoint| checkpoint.write(files, film)));
+    written
+}
+
 /// Writes what a finished film can be written to again and is no file of layers that is there: its colours may be asked for otherwise.
 ///
 /// # Errors

@@ -111,7 +111,7 @@ impl Taken<'_> {
     fn save_noisy(&mut self, args: &Args) -> Result<()> {
         let Self { film, host, files, checkpoint, .. } = self;
         let item = outputs::before_filter(args, film);
-        let save = || Ok(outputs::save(item.as_slice(), film, files, checkpoint.take(), true));
+        let save = || Ok(outputs::save_noisy(item.as_slice(), film, files, checkpoint));
         let line = outputs::unfiltered(&host.time("write", save)?);
         let line = files.with_failures(&line);
         if interrupt::leave_at_once(&line) {
