@@ -160,7 +160,8 @@ impl DeviceScene {
 /// The scene's own records, or flat ones where kernels read what the scene does not have (`--effects all`).
 fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
     let maps = effects.textures || effects.bump_maps || effects.normal_maps || effects.alpha_masks;
-    let read = effects.smooth_normals || effects.vertex_colors || maps;
+    let slopes = effects.anisotropic || effects.coat_normals;
+    let read = effects.smooth_normals || effects.vertex_colors || maps || slopes;
     if read && scene.shading.is_empty() {
         return vec![Shading { normal: [u32::MAX; 3], ..Shading::default() }; scene.triangles.len()].into();
     }
@@ -355,6 +356,25 @@ impl FilmBuffers {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_effect_that_reads_records_of_corners_finds_one_of_each_triangle() {
+        let scene = Scene { triangles: vec![Triangle::default(); 3], ..Scene::default() };
+        let none = Effects::default();
+        assert!(shading(&scene, &none).is_empty());
+        for effects in [
+            Effects { smooth_normals: true, ..none },
+            Effects { vertex_colors: true, ..none },
+            Effects { textures: true, ..none },
+            Effects { bump_maps: true, ..none },
+            Effects { normal_maps: true, ..none },
+            Effects { coat_normals: true, ..none },
+            Effects { anisotropic: true, ..none },
+            Effects { alpha_masks: true, ..none },
+        ] {
+            assert_eq!(shading(&scene, &effects).len(), 3, "{effects:?}");
+        }
+    }
 
     #[test]
     fn tiles_are_whole_windows_whichever_limit_is_the_least() {
