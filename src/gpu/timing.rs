@@ -11,7 +11,7 @@ const POOL: u32 = 1024;
 /// The times of one pass. Both are on the device's clock, which [`super::Gpu::calibrate`] relates to the host's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PassTime {
-    /// The kernel's name, or `copy`, `fill` or `update`.
+    /// The kernel's name, or what was done without one: `copy`, `fill`, `update`, `upload`, `build_meshes` or `build_copies`.
     pub name: &'static str,
     /// Begin of the pass in nanoseconds.
     pub begin_ns: u64,
