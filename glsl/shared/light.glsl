@@ -45,13 +45,15 @@ uint alias_slot(uint n, uint random) {
 
 // Chooses the slot that `random` does or its alias, where `entry` is that slot's. Replaces `random` by its position within the
 // choice's share of the slot: a word independent of the choice and as well stratified. A hash fills up the bits that the
-// choice used.
+// choice of the slot used, before the rest decides: of 2^25 slots it leaves 128 steps within each, by which aliases, among them
+// the sun of a large sky, would be chosen too seldom.
 uint alias_choose(AliasEntry entry, uint n, inout uint random) {
-    uint slot, low;
+    uint slot, low, fill, rest, hash = pcg(random);
     umulExtended(random, n, slot, low);
+    umulExtended(hash, n, fill, rest);
+    low += min(fill, 0xffffffffu - low);
     bool stays = low < entry.threshold;
-    uint hash = pcg(random);
-    float into = float(stays ? low : low - entry.threshold) + float(hash) * (float(n) / 4294967296.0);
+    float into = float(stays ? low : low - entry.threshold);
     float share = stays ? float(entry.threshold) : 4294967296.0 - float(entry.threshold);
     random = word_of_unit(into / share, hash);
     return stays ? slot : entry.alias;

@@ -33,12 +33,12 @@ pub use crate::twins::light_tree::Receiver;
 /// The entry that a random word chooses, and a word that is independent of it and as well stratified.
 pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
     let product = u64::from(random) * table.len() as u64;
-    let (slot, low) = ((product >> 32) as u32, product as u32);
+    let hash = pcg(random);
+    let fill = (u64::from(hash) * table.len() as u64) >> 32;
+    let (slot, low) = ((product >> 32) as u32, (product as u32).saturating_add(fill as u32));
     let entry = table[slot as usize];
     let stays = low < entry.threshold;
-    let hash = pcg(random);
-    let into =
-        (if stays { low } else { low - entry.threshold }) as f32 + hash as f32 * (table.len() as f32 / 4294967296.0);
+    let into = (if stays { low } else { low - entry.threshold }) as f32;
     let share = if stays { entry.threshold as f32 } else { 4294967296.0 - entry.threshold as f32 };
     (if stays { slot } else { entry.alias }, word_of_unit(into / share, hash))
 }

@@ -1,6 +1,5 @@
 //! Alias tables (Walker 1977; construction after Vose 1991) in integer arithmetic: what a table returns is known
-//! exactly, so the probability that an estimator divides by is the one that the kernel draws with. In a slot of a table of 2^k entries the
-//! kernel's word takes steps of 2^k out of 2^32: a sky of 8192 x 4096 texels is off by up to .1 % there.
+//! exactly, so the probability that an estimator divides by is the one that the kernel draws with.
 use crate::layout::AliasEntry;
 
 /// Units of probability that one slot holds.
@@ -59,6 +58,8 @@ pub fn probabilities(table: &[AliasEntry]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::hash::pcg;
+    use crate::twins::light::alias_choose;
 
     #[test]
     fn the_worked_example_is_exact() {
@@ -90,5 +91,20 @@ mod tests {
         assert_eq!(probabilities(&build(&[0.0, 0.0])), [0.5, 0.5]);
         assert!(build(&[]).is_empty());
         assert_eq!(probabilities(&build(&[3.0])), [1.0]);
+    }
+
+    /// A sun among 2^20 texels, of which each other one keeps a 16,384th of its slot, while a word takes but 4096 steps there.
+    #[test]
+    fn dim_texels_of_a_large_sky_are_drawn_as_seldom_as_claimed() {
+        const TEXELS: usize = 1 << 20;
+        const STEPS: u32 = 1 << 14;
+        let mut weights = vec![1.0; TEXELS];
+        weights[77] = TEXELS as f64 * f64::from(STEPS);
+        let table = build(&weights);
+        let count = 1 << 22;
+        let expected = (1.0 - probabilities(&table)[77]) * f64::from(count);
+        assert!((expected - f64::from(count / STEPS)).abs() < 1.0, "{expected}");
+        let dim = (0..count).filter(|&i| alias_choose(&table, pcg(i)).0 != 77).count() as f64;
+        assert!((dim - expected).abs() < 5.0 * expected.sqrt(), "{dim} of {count}, expected {expected}");
     }
 }
