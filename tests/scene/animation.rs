@@ -100,6 +100,26 @@ fn a_place_with_shear_keeps_it_where_keys_move_it() {
     assert!(whole.matrix3.x_axis.abs_diff_eq(glam::DVec3::Y, 1e-12), "{whole:?}");
 }
 
+/// Several scales and rotations make one matrix where scales are negative: what keys leave out is what the table says.
+#[test]
+fn a_mirrored_place_stays_mirrored_as_it_is() {
+    for (scale, keys) in [
+        ("[1, -1, 1]", "rotate = [0, 0, 0]"),
+        ("[-1, -1, 1]", "rotate = [0, 0, 0]"),
+        ("[1, 1, -2]", "rotate = [0, 0, 0], translate = [0, 0, 0]"),
+        ("[1, -1, 1]", "scale = [1, -1, 1]"),
+    ] {
+        let tables = format!(
+            "[[instance]]\nname = \"mirrored\"\nmesh = \"cube\"\ntransform = {{ scale = {scale} }}\n\
+             [[animation]]\ninstance = \"mirrored\"\nkeys = [{{ time = 0, {keys} }}]"
+        );
+        let at = pose(&tables, 0.0).instances[0].1.0;
+        let numbers: Vec<f64> = scale.trim_matches(['[', ']']).split(", ").map(|v| v.parse().unwrap()).collect();
+        let expected = glam::DMat3::from_diagonal(glam::DVec3::from_slice(&numbers));
+        assert!(at.matrix3.abs_diff_eq(expected, 1e-12), "{scale}, {keys}: {:?}", at.matrix3);
+    }
+}
+
 /// A frame alone cannot know how large a lamp is in the others.
 #[test]
 fn lamps_that_may_grow_are_sampled_as_large_ones() {

@@ -239,7 +239,7 @@ fn what_is_hidden_comes_back() {
     let whole = scene.clone();
     let lights = scene.lights.len();
     scene.large_lamps = true; // the panel is none
-    let gone = Transform(DAffine3::ZERO);
+    let gone = Transform::from(DAffine3::ZERO);
     let hide = Pose { instances: (0..3).map(|i| (i, gone)).collect(), ..Pose::default() };
     scene.apply(&hide).unwrap();
     scene.check().unwrap();
@@ -297,7 +297,7 @@ fn what_is_large_and_out_of_reach_is_refused_as_by_the_loader() {
 fn poses_that_cannot_be_are_one_line_and_change_nothing() {
     let mut scene = at(&Moment::default()).scene;
     let (before, mesh) = (arrays(&scene), scene.rig.mesh("cloth").unwrap());
-    let place = |number, at| Pose { instances: vec![(number, Transform(at))], ..Pose::default() };
+    let place = |number, at| Pose { instances: vec![(number, Transform::from(at))], ..Pose::default() };
     let deform = |mesh, positions: Vec<[f32; 3]>, normals| Pose {
         meshes: vec![(mesh, Vertices { positions, normals, ..Vertices::default() })],
         ..Pose::default()

@@ -12,7 +12,7 @@ pub enum Target {
     /// The camera.
     Camera(Camera),
     /// What a placement puts where.
-    Placement(usize, DAffine3),
+    Placement(usize, Transform),
     /// A node of a glTF file, which [`Keyed::place`] puts where it belongs.
     Node,
     /// A light.
@@ -122,16 +122,16 @@ impl Keyed {
     }
 
     /// Where keys put what otherwise is at `rest`.
-    pub fn place(&self, rest: &DAffine3, at: f64) -> DAffine3 {
+    pub fn place(&self, rest: &Transform, at: f64) -> DAffine3 {
         if let Some(placed) = self.find("transform", at).and_then(|rows| affine(&rows)) {
             return placed;
         }
-        let translation = self.three("translate", at).map_or(rest.translation, DVec3::from);
+        let translation = self.three("translate", at).map_or(rest.0.translation, DVec3::from);
         let [scale, rotation] = [self.find("scale", at), self.find("rotate", at)];
         if scale.is_none() && rotation.is_none() {
-            return DAffine3 { translation, ..*rest }; // which may have shear
+            return DAffine3 { translation, ..rest.0 }; // which may have shear
         }
-        let (was, turned, _) = parts(rest).unwrap_or((DVec3::ONE, DQuat::IDENTITY, rest.translation));
+        let (was, turned) = rest.steps().unwrap_or((DVec3::ONE, DQuat::IDENTITY));
         let scale = self.three("scale", at).map_or(was, DVec3::from);
         let rotation = rotation.map_or(turned, |q| DQuat::from_slice(&q));
         DAffine3::from_scale_rotation_translation(scale, rotation, translation)
@@ -149,23 +149,11 @@ impl Keyed {
     }
 }
 
-/// Scale, rotation and translation of a transform that has no shear.
-pub fn parts(of: &DAffine3) -> Option<(DVec3, DQuat, DVec3)> {
-    let (scale, rotation, translation) = of.to_scale_rotation_translation();
-    let again = DAffine3::from_scale_rotation_translation(scale, rotation, translation);
-    let size = of.matrix3.to_cols_array().iter().fold(0f64, |most, v| most.max(v.abs()));
-    (rotation.is_finite() && again.matrix3.abs_diff_eq(of.matrix3, 1e-5 * size)).then_some((
-        scale,
-        rotation,
-        translation,
-    ))
-}
-
 impl Mover for Keyed {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
         match &self.target {
             Target::Camera(rest) => pose.camera = Some(self.camera(rest, seconds)),
-            Target::Placement(number, rest) => pose.instances.push((*number, Transform(self.place(rest, seconds)))),
+            Target::Placement(number, rest) => pose.instances.push((*number, self.place(rest, seconds).into())),
             Target::Node => {}
             Target::Light(number, rest) => pose.lights.push((*number, self.light(rest, seconds))),
             Target::Material(number) => pose.materials.push((*number, self.material(seconds))),

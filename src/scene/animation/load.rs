@@ -1,15 +1,14 @@
 //! Makes movers of the `[[animation]]` tables.
 use super::curve::Curve;
 use super::frames::Frames;
-use super::keyed::{Keyed, Target, parts};
+use super::keyed::{Keyed, Target};
 use super::{Animation, Mover};
 use crate::error::{Checked, Error, Result};
 use crate::scene::Scene;
 use crate::scene::description::{
     self, AnimationTable, Camera, Description, Interpolation, mesh_number, meshes_to_free, numbered, rotation,
 };
-use crate::scene::description::{Key, affine};
-use glam::DAffine3;
+use crate::scene::description::{Key, Transform, affine};
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -92,8 +91,8 @@ fn target(table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<
     if let Some(name) = &table.instance {
         let number = scene.rig.placement(name).ok_or_else(|| not_placed(name, from))?;
         let rest = match from.instance.get(number) {
-            Some(instance) => instance.transform.0,
-            None => mesh_number(from, name).map_or(DAffine3::IDENTITY, |number| from.mesh[number].transform.0),
+            Some(instance) => instance.transform,
+            None => mesh_number(from, name).map_or(Transform::default(), |number| from.mesh[number].transform),
         };
         return Ok((format!("instance \"{name}\""), Target::Placement(number, rest)));
     }
@@ -165,7 +164,11 @@ fn add(
         curves.push((name, Curve::new(keys, interpolation, true)?));
         return Ok(());
     }
-    let split: Option<Vec<_>> = keys.iter().map(|(_, rows)| parts(&affine(rows)?)).collect();
+    let steps = |rows: &[f64]| {
+        let placed = affine(rows)?;
+        Transform::from(placed).steps().map(|(scale, rotation)| (scale, rotation, placed.translation))
+    };
+    let split: Option<Vec<_>> = keys.iter().map(|(_, rows)| steps(rows)).collect();
     match split.filter(|_| name == "transform" && interpolation == Interpolation::Linear) {
         Some(split) => {
             let of = |value: &dyn Fn(usize) -> Vec<f64>| (0..keys.len()).map(|i| (keys[i].0, value(i))).collect();
@@ -199,7 +202,7 @@ fn check(key: &Key, target: &Target) -> Checked {
     if (moves || turns || scales) && key.values.contains_key("transform") {
         return Err("has a transform and parts of one: choose".to_owned());
     }
-    let sheared = matches!(target, Target::Placement(_, rest) if parts(rest).is_none());
+    let sheared = matches!(target, Target::Placement(_, rest) if rest.steps().is_none());
     match sheared && turns != scales {
         true => Err("its table's transform has shear, which has no rotate or scale to keep: give both".to_owned()),
         false => Ok(()),

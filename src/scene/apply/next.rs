@@ -129,7 +129,7 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
         if !affine.is_finite() {
             return Err(format!("instance {number} gets a transform with NaN or infinite numbers"));
         }
-        if !Transform(affine).has_inverse() {
+        if !Transform::from(affine).has_inverse() {
             flat.insert(copy);
             continue;
         }

@@ -89,11 +89,33 @@ impl<'de> Deserialize<'de> for Scale {
 /// A placement: 16 row-major numbers (column vectors, last row 0 0 0 1) or `{ translate, rotate, scale }`.
 /// It may have no inverse: the code that uses it checks that and names the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Transform(pub DAffine3);
+pub struct Transform(pub DAffine3, Option<(DVec3, DQuat)>);
+
+impl From<DAffine3> for Transform {
+    fn from(affine: DAffine3) -> Self {
+        Self(affine, None)
+    }
+}
 
 impl Transform {
     /// Largest factor by which the space of what is placed may be larger than the world: 1e18, whose square a 32-bit float holds.
     const MAX_GROWTH: f64 = 1e18;
+
+    /// Scaled first, then rotated, then moved.
+    pub fn of_steps(scale: DVec3, rotation: DQuat, translation: DVec3) -> Self {
+        Self(DAffine3::from_scale_rotation_translation(scale, rotation, translation), Some((scale, rotation)))
+    }
+
+    /// Scale and rotation: those that it was made of, or those of a matrix without shear, of which several with negative scales are the same.
+    pub fn steps(&self) -> Option<(DVec3, DQuat)> {
+        self.1.or_else(|| {
+            let (scale, rotation, translation) = self.0.to_scale_rotation_translation();
+            let again = DAffine3::from_scale_rotation_translation(scale, rotation, translation);
+            let size = self.0.matrix3.to_cols_array().iter().fold(0f64, |most, v| most.max(v.abs()));
+            let same = rotation.is_finite() && again.matrix3.abs_diff_eq(self.0.matrix3, 1e-5 * size);
+            same.then_some((scale, rotation))
+        })
+    }
 
     /// Whether rays can be brought to the space of what it places.
     pub fn has_inverse(&self) -> bool {
@@ -114,7 +136,7 @@ impl TryFrom<[f64; 16]> for Transform {
     fn try_from(rows: [f64; 16]) -> crate::error::Result<Self> {
         let m = DMat4::from_cols_array(&rows).transpose();
         match m.row(3).to_array() {
-            [0.0, 0.0, 0.0, w] if w != 0.0 => Ok(Self(DAffine3::from_mat4(m * (1.0 / w)))),
+            [0.0, 0.0, 0.0, w] if w != 0.0 => Ok(DAffine3::from_mat4(m * (1.0 / w)).into()),
             row => Err(crate::error::Error::Usage(format!(
                 "the last row of transform is {row:?}, not 0 0 0 1: give the matrix row by row"
             ))),
@@ -142,9 +164,7 @@ impl<'de> Deserialize<'de> for Transform {
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Transform, A::Error> {
                 let steps = Steps::deserialize(value::MapAccessDeserializer::new(map))?;
                 let scale = steps.scale.map_or(DVec3::ONE, |s| s.0);
-                let affine =
-                    DAffine3::from_scale_rotation_translation(scale, steps.rotate.0, DVec3::from(steps.translate));
-                Ok(Transform(affine))
+                Ok(Transform::of_steps(scale, steps.rotate.0, steps.translate.into()))
             }
         }
         deserializer.deserialize_any(Either)
@@ -186,7 +206,7 @@ mod tests {
     #[test]
     fn numbers_in_memory_are_held_to_what_a_file_is() {
         let rows = [2., 0., 0., 10., 0., 2., 0., 12., 0., 0., 2., 14., 0., 0., 0., 2.];
-        let Transform(halved) = Transform::try_from(rows).unwrap();
+        let halved = Transform::try_from(rows).unwrap().0;
         assert_eq!(halved, DAffine3::from_translation(DVec3::new(5., 6., 7.)));
         let columns = DMat4::from_translation(DVec3::new(5., 6., 7.)).to_cols_array();
         for wrong in [columns, [0.; 16]] {

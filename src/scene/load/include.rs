@@ -3,7 +3,7 @@ use super::gltf::{self, Model};
 use super::mesh_file::Format;
 use crate::error::{Error, Result};
 use crate::scene::animation::{self, Keyed, Mover};
-use crate::scene::description::{Description, InstanceTable, LightTable, MaterialTable, MeshTable, Transform};
+use crate::scene::description::{Description, InstanceTable, LightTable, MaterialTable, MeshTable};
 use crate::scene::pose::Pose;
 use glam::{DAffine3, Vec3};
 use std::borrow::Cow;
@@ -168,7 +168,7 @@ impl<'a> Place<'a> {
         match self.instanced {
             _ if placed => {}
             true => to.instance.extend(self.copies.iter().map(|copy| at(copy, &DAffine3::IDENTITY, &name))),
-            false => mesh.transform = Transform(self.copies[0].0 * mesh.transform.0),
+            false => mesh.transform = (self.copies[0].0 * mesh.transform.0).into(),
         }
         mesh.name = Some(name);
         to.mesh.push(mesh);
@@ -177,7 +177,7 @@ impl<'a> Place<'a> {
 
 /// An instance of a copy.
 fn at((affine, material): &(DAffine3, Option<String>), own: &DAffine3, mesh: &str) -> InstanceTable {
-    let (mesh, material, transform) = (mesh.to_owned(), material.clone(), Transform(*affine * *own));
+    let (mesh, material, transform) = (mesh.to_owned(), material.clone(), (*affine * *own).into());
     InstanceTable { mesh, transform, material, name: None }
 }
 
@@ -206,7 +206,7 @@ impl Mover for Within {
         let mut own = Pose::default();
         self.mover.pose(seconds, &mut own)?;
         for (number, transform) in own.instances {
-            let copies = self.copies.iter().map(|copy| Transform(*copy * transform.0));
+            let copies = self.copies.iter().map(|copy| (*copy * transform.0).into());
             pose.instances.extend((self.instances[number]..).zip(copies));
         }
         for (number, light) in own.lights {

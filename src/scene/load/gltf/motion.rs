@@ -72,7 +72,7 @@ impl Motion {
         let mut locals = self.tree.locals.clone();
         self.channels.iter().for_each(|channel| channel.apply(seconds, &mut locals));
         for (node, keys) in &self.keyed {
-            locals[*node] = Local::Matrix(keys.place(&locals[*node].affine(), seconds));
+            locals[*node] = Local::Matrix(keys.place(&locals[*node].transform(), seconds));
         }
         self.tree.worlds(&locals)
     }
@@ -83,7 +83,7 @@ impl Mover for Motion {
         let worlds = self.worlds(seconds);
         let morphs = self.channels.iter().filter(|channel| channel.is_morph());
         let weights: HashMap<_, _> = morphs.map(|channel| (channel.node, channel.weights(seconds))).collect();
-        pose.instances.extend(self.instances.iter().map(|i| (i.number, Transform(worlds[i.node] * i.own))));
+        pose.instances.extend(self.instances.iter().map(|i| (i.number, Transform::from(worlds[i.node] * i.own))));
         pose.lights.extend(self.lights.iter().map(|l| (l.number, light::placed(&l.table, &worlds[l.node]))));
         for moved in &self.meshes {
             let matrices = moved.skin.as_ref().map(|skin| skin.matrices(&worlds));

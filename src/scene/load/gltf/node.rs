@@ -1,6 +1,7 @@
 //! The node hierarchy: which nodes the scene shows, and where they are.
 use super::asset::Asset;
 use crate::error::Result;
+use crate::scene::description::Transform;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf_json::scene::Node;
 
@@ -35,13 +36,18 @@ impl Local {
 
     /// The transform; a rotation without length or with NaN counts as none.
     pub fn affine(&self) -> DAffine3 {
+        self.transform().0
+    }
+
+    /// The same, with the steps that it is made of.
+    pub fn transform(&self) -> Transform {
         match *self {
-            Self::Matrix(matrix) => matrix,
+            Self::Matrix(matrix) => matrix.into(),
             Self::Steps { translation, rotation, scale } => {
                 let length = rotation.length();
                 let usable = length.is_finite() && length > 1e-30;
                 let turn = if usable { rotation * (1.0 / length) } else { DQuat::IDENTITY };
-                DAffine3::from_scale_rotation_translation(scale, turn, translation)
+                Transform::of_steps(scale, turn, translation)
             }
         }
     }

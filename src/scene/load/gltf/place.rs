@@ -235,7 +235,7 @@ impl<'a> Placer<'a> {
         let owns = several.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
         let mut copies: Vec<_> = owns.into_iter().map(|own| Copy { node, own }).collect();
         copies.retain(|copy| {
-            let world = Transform(self.world(copy));
+            let world = Transform::from(self.world(copy));
             // What moves may be flat at rest alone; vertices that move are not baked.
             self.moved.nodes[node] || world.has_inverse() || !self.moved.weights[node] && spans_a_plane(&world.0)
         });
@@ -250,7 +250,7 @@ impl<'a> Placer<'a> {
     /// Adds a mesh at every one of `copies`: baked where it is flattened, as instances where there are several, or where its node
     /// moves.
     fn add(&mut self, name: &str, mesh: Mesh, material: Option<usize>, copies: &[Copy]) -> Result<()> {
-        let stays_whole = |copy: &&Copy| self.moved.nodes[copy.node] || Transform(self.world(copy)).has_inverse();
+        let stays_whole = |copy: &&Copy| self.moved.nodes[copy.node] || Transform::from(self.world(copy)).has_inverse();
         let (copies, flat): (Vec<Copy>, Vec<Copy>) = copies.iter().partition(stays_whole);
         for copy in flat {
             self.add_flattened(name, &mesh, material, &copy)?;
@@ -264,14 +264,14 @@ impl<'a> Placer<'a> {
         if let [only] = copies[..]
             && !self.moved.nodes[only.node]
         {
-            self.tables[at].transform = Transform(self.world(&only));
+            self.tables[at].transform = Transform::from(self.world(&only));
             return Ok(());
         }
         let mesh = self.tables[at].name.clone().unwrap_or_default();
         for copy in copies {
             let (number, Copy { node, own }) = (self.instances.len(), copy);
             self.found.instances.extend(self.moved.nodes[node].then_some(MovedInstance { number, node, own }));
-            let world = Transform(self.world(&copy));
+            let world = Transform::from(self.world(&copy));
             let transform = if world.has_inverse() { world } else { speck(&world.0) };
             self.instances.push(InstanceTable { mesh: mesh.clone(), transform, ..InstanceTable::default() });
         }
@@ -359,5 +359,5 @@ fn spans_a_plane(affine: &DAffine3) -> bool {
 /// Stands in at rest for what is flat then, and moves: so small that it is not seen.
 fn speck(affine: &DAffine3) -> Transform {
     const SIZE: f64 = 1e-6;
-    Transform(DAffine3 { translation: affine.translation, ..DAffine3::from_scale(DVec3::splat(SIZE)) })
+    Transform::from(DAffine3 { translation: affine.translation, ..DAffine3::from_scale(DVec3::splat(SIZE)) })
 }
