@@ -5,7 +5,8 @@
 
 // At the end of a frame, before anything changes, writes what each pixel hands on to the next: the point that its samples are of, and
 // their statistics.
-// Pixels of specular surfaces hand on nothing (Schalk 2018, 3.2), unless nothing has moved: then every pixel keeps all that it has.
+// Pixels of specular surfaces hand on nothing (Schalk 2018, 3.2), nor do those of surfaces that are partly opaque, unless nothing has
+// moved: then every pixel keeps all that it has.
 // Departures from there: pixels hand on as many samples as are worth it by what their neighbours show, and those of edges hand them
 // on to pixels of edges.
 layout(local_size_x_id = 100) in;
@@ -34,6 +35,18 @@ bool is_sharp(Bsdf b) {
         return coat || smooth_alpha(b.metallic.alpha) || b.metallic.through != vec3(0.0);
     }
     return is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC) || (bsdf_is_specular(b) && is_smooth(b));
+}
+
+// Whether samples of the pixel may have passed through a surface that its guide shows, or been stopped by one that its guide has passed
+// through: they are of several points then, of which but one is known. Holes of a texture have an opacity of 1 beside them.
+bool is_veiled(uint pixel, SurfacePoint at, Surface s) {
+    if (!FX_ALPHA_MASKS) return false;
+    bool veiled = surface_opacity(s.material, at.triangle, at.weights) < 1.0;
+    for (int k = 0; k < 9; k++) {
+        uint material = Guide_material(guide, neighbour(pixel, k));
+        veiled = veiled || material != NONE && Material_opacity(materials, material) < 1.0;
+    }
+    return veiled;
 }
 
 // From one frame to the next a pixel moves against an edge, and the share of it that shows the other surface changes: by how far
@@ -123,7 +136,7 @@ uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c, out float nois
     if (at.triangle == NONE) return DROPPED_SKY;
     Surface s = surface_of(at);
     c.back = dot(s.geometric, previous.position - s.position) < 0.0;
-    if (is_sharp(surface_bsdf(s))) return DROPPED_SPECULAR;
+    if (is_sharp(surface_bsdf(s)) || is_veiled(pixel, at, s)) return DROPPED_SPECULAR;
     c.edge = !is_whole(pixel, s.geometric, pixel_width(previous, push.size));
     resting = word_of(c);
     c.count = min(kept_by_spread(pixel, s.geometric, c.count, c.edge, noise), kept_of_edge(pixel, s.geometric, c.count, c.edge));

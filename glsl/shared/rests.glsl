@@ -4,13 +4,13 @@
 const float AT_REST = 0.03125;
 
 // Whether the pixel's point is seen through its centre, where points begin, from the side that its samples are of, and still is what is
-// seen there.
+// seen there. What the sky and specular surfaces show is looked at by no probe: the sky rests as long as its light does, these never.
 bool point_rests(uint pixel) {
     uint triangle = History_triangle(history, pixel);
-    if (triangle == NONE) return Guide_object(guide, pixel) == NONE;
+    if (triangle == NONE) return push.sky == 0u && Guide_object(guide, pixel) == NONE;
     Surface s = surface_of(triangle, History_instance(history, pixel), History_weights(history, pixel));
     Carried c = carried_of(History_resting(history, pixel));
-    bool same_side = c.count == 0u || c.back == (dot(s.geometric, camera.position - s.position) < 0.0);
+    bool same_side = c.count > 0u && c.back == (dot(s.geometric, camera.position - s.position) < 0.0);
     vec3 film = film_from_point(camera, s.position, push.size);
     vec2 off = abs(film.xy - vec2(pixel % push.size.x, pixel / push.size.x) - 0.5);
     return same_side && film.z > 0.0 && max(off.x, off.y) <= AT_REST && shows(pixel, s);

@@ -68,6 +68,8 @@ gpu_structs! {
         spp: uint,
         /// 1 where something in the scene has changed besides the camera.
         moved: uint,
+        /// 1 where the light of the sky has changed.
+        sky: uint,
         /// 1 where instances are numbered anew.
         instances: uint,
         /// 1 where triangles are numbered anew.

@@ -1,7 +1,7 @@
 //! What a pose has changed in a scene's arrays.
 use super::Scene;
 use crate::error::{Error, Result};
-use crate::layout::Light;
+use crate::layout::{LIGHT_ENVIRONMENT, Light};
 use std::ops::Range;
 
 /// What [`Scene::apply`](super::Scene::apply) has changed, for those who copy it to a device.
@@ -67,6 +67,14 @@ impl Change {
         let Self { everything, camera: _, nodes, triangles, instances, materials, texels, lights, deformed, .. } = self;
         let arrays = nodes.is_empty() && triangles.is_empty() && texels.is_empty() && deformed.is_empty();
         arrays && !(*everything || *instances || *materials || *lights) // without these, no numbers are new
+    }
+
+    /// Whether the sky shows something else than before in `scene`, to which it has led.
+    pub fn changes_sky(&self, scene: &Scene) -> bool {
+        let before = self.lights_before.iter().map(|(_, light)| light).find(|l| l.kind == LIGHT_ENVIRONMENT);
+        let now = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
+        let shown = |sky: Option<&Light>| sky.map(|sky| (sky.value, [sky.a, sky.b, sky.c]));
+        self.lights && shown(before) != shown(now)
     }
 
     /// Adds what a later pose has changed in the same scene.

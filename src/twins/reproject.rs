@@ -16,6 +16,7 @@ use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
 use crate::twins::light_change::{probe_cell_of, square};
 use crate::twins::surface::{Surface, facing_normals, surface_at, surface_bsdf, view_of};
+use crate::twins::texture::surface_opacity;
 use crate::twins::traverse::Hit;
 use glam::{Vec2, Vec3, Vec4, vec2};
 
@@ -123,6 +124,15 @@ impl Reprojection<'_> {
         square(pixel, self.push.size).all(|q| self.shows_same([&guide[pixel], &guide[q]], plane, width))
     }
 
+    /// Whether samples of a pixel may have passed through a surface, or been stopped by one, that its guide does not tell of.
+    fn is_veiled(&self, guide: &[Guide], pixel: usize, at: &SurfacePoint, s: &Surface) -> bool {
+        let material = |q: usize| Some(guide[q].material).filter(|&material| material != NONE);
+        surface_opacity(self.before, s.material, at.triangle, at.weights.into()) < 1.0
+            || square(pixel, self.push.size)
+                .filter_map(material)
+                .any(|m| self.before.materials[m as usize].opacity < 1.0)
+    }
+
     /// How many of `count` samples of a pixel at an edge are worth handing on.
     fn kept_of_edge(&self, left: &Left, pixel: usize, plane: Vec3, count: u32) -> u32 {
         let width = pixel_width(&self.previous, self.push.size);
@@ -196,7 +206,7 @@ impl Reprojection<'_> {
         }
         let s = surface_of(self.before, at.triangle, at.instance, at.weights);
         c.back = s.geometric.dot(Vec3::from(self.previous.position) - s.position) < 0.0;
-        if is_sharp(&surface_bsdf(self.before, &s)) {
+        if is_sharp(&surface_bsdf(self.before, &s)) || self.is_veiled(left.guide, pixel, &at, &s) {
             return DROPPED_SPECULAR;
         }
         c.edge = !self.is_whole(left.guide, pixel, s.geometric, pixel_width(&self.previous, self.push.size));
@@ -354,13 +364,14 @@ impl Reprojection<'_> {
     fn point_rests(&self, handed: &Handed, guide: &[Guide], pixel: usize) -> bool {
         let (h, width) = (&handed.records[pixel], self.push.size[0] as usize);
         if h.triangle == NONE {
-            return guide[pixel].object == NONE;
+            return self.push.sky == 0 && guide[pixel].object == NONE;
         }
         let s = surface_of(self.scene, h.triangle, h.instance, h.weights);
         let film = film_from_point(&self.camera, s.position, self.push.size);
         let off = film.truncate() - vec2((pixel % width) as f32, (pixel / width) as f32) - 0.5;
         let (c, back) = (Carried::of(h.resting), s.geometric.dot(Vec3::from(self.camera.position) - s.position) < 0.0);
-        (c.count == 0 || c.back == back)
+        c.count > 0
+            && c.back == back
             && film.z > 0.0
             && off.abs().max_element() <= AT_REST
             && self.shows(&guide[pixel], &s)

@@ -7,7 +7,7 @@ use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Camera, PixelStats};
 use tallow::render::{Outputs, Renderer, Reproject, carried_samples};
 use tallow::scene::description::{LightTable, Rgb, Transform};
-use tallow::scene::{Loaded, MaterialChange, Pose, Scene};
+use tallow::scene::{EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
 
 /// A floor, a wall and a ball under a small lamp that a board shades, all out of view, beside a bulb; a dim sky.
 fn room() -> Loaded {
@@ -39,7 +39,7 @@ fn moved(scene: &Scene, name: &str, x: f64, y: f64, z: f64) -> Pose {
         "panel" => Transform::try_from([0.5, 0., 0., 0., 0., 0., -0.5, 0., 0., 0.5, 0., 0., 0., 0., 0., 1.]).unwrap(),
         _ => Transform::try_from([0.25, 0., 0., 0., 0., 0.25, 0., 0., 0., 0., 0.25, 0., 0., 0., 0., 1.]).unwrap(),
     };
-    Pose { instances: vec![(place, Transform(at.0 * was.0))], ..Pose::default() }
+    Pose { instances: vec![(place, Transform::from(at.0 * was.0))], ..Pose::default() }
 }
 
 fn shining(scene: &Scene, name: &str, emission: f32) -> Pose {
@@ -83,8 +83,7 @@ struct Stage {
 }
 
 impl Stage {
-    fn new(gpu: &Gpu, settings: Reproject) -> Self {
-        let scene = room();
+    fn new(gpu: &Gpu, scene: Loaded, settings: Reproject) -> Self {
         let long = scene.clone().with(|s| (s.spp, s.seed) = (64, 99));
         let still = Renderer::new(gpu, &long, &long.settings, Outputs::default()).unwrap();
         Self { gpu: gpu.clone(), film: Film::moving(gpu, &scene, settings), still, scene }
@@ -135,15 +134,66 @@ fn light_that_has_changed_leaves_no_ghost() {
     let gpu = gpu();
     let mut found = Vec::new();
     for way in WAYS {
-        let mut stage = Stage::new(&gpu, by(way));
+        let mut stage = Stage::new(&gpu, room(), by(way));
         for (event, moves) in EVENTS.iter().flat_map(|event| [(event, false), (event, true)]) {
             found.push((event.0, moves, stage.ghost(event, moves)));
         }
     }
     assert!(found.iter().all(|(_, _, left)| left.abs() < 0.01), "(event, camera moves, what is left): {found:?}");
-    let mut keeps_all = Stage::new(&gpu, Reproject { reproject_light: 1e9, ..Reproject::default() });
+    let mut keeps_all = Stage::new(&gpu, room(), Reproject { reproject_light: 1e9, ..Reproject::default() });
     let left = keeps_all.ghost(&EVENTS[0], false);
     assert!(left > 0.3, "control: {left} is left where all is kept");
+    assert_silent(&gpu);
+}
+
+/// A veil that stops half of what is seen through it, before a sign that shines on nothing but its back.
+fn veil() -> Loaded {
+    let mut scene = Workplace::new().scene(
+        "[camera]\nposition = [0.0, 0.0, 6.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n[environment]\nradiance = 0.05\n\
+         [[material]]\nname = 'glow'\ncolor = 0.0\nemission = 4.0\n[[material]]\nname = 'veil'\nopacity = 0.5\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'veil'\ntransform = { scale = 6.0, translate = [0.0, 0.0, 3.0] }\n\
+         [[mesh]]\nname = 'sign'\nshape = 'sphere'\nsegments = 24\nmaterial = 'glow'\n\
+         [[instance]]\nname = 'sign'\nmesh = 'sign'\ntransform = { scale = 0.25, translate = [1.2, 0.6, 0.3] }\n",
+    );
+    let s = &mut scene.settings;
+    (s.width, s.height, s.spp, s.max_depth) = (49, 33, 16, 4);
+    scene
+}
+
+/// Half of the samples of each pixel are of the veil, at rest and lit as ever, the others of what lies behind it.
+#[test]
+fn what_has_been_seen_through_a_veil_leaves_no_ghost() {
+    let gpu = gpu();
+    for way in WAYS {
+        let mut stage = Stage::new(&gpu, veil(), by(way));
+        for moves in [false, true] {
+            let left = stage.ghost(&EVENTS[5], moves);
+            assert!(left.abs() < 0.01, "{way:?}, the camera moves: {moves}: {left} is left");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// Nothing is lit where a ball is black, so that pixels at its edge alone show that a sky has gone dark.
+#[test]
+fn a_sky_that_goes_dark_leaves_no_rim() {
+    let gpu = gpu();
+    for way in WAYS {
+        let mut scene = Workplace::new().scene(
+            "[camera]\nposition = [0.0, 0.0, 6.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n[environment]\nradiance = 1.0\n\
+             [[material]]\nname = 'black'\ncolor = 0.0\n[[mesh]]\nshape = 'sphere'\nsegments = 48\nmaterial = 'black'\n",
+        );
+        (scene.settings.width, scene.settings.height, scene.settings.spp) = (49, 33, 16);
+        let mut film = Film::moving(&gpu, &scene, by(way));
+        (0..FRAMES[0]).for_each(|_| film.frame(film.camera));
+        let rim = |film: &Film| film.stats().iter().filter(|s| (0.05..0.95).contains(&s.mean[1])).count();
+        assert!(rim(&film) > 20, "control: pixels that show both");
+        let environment = Some(EnvironmentChange { radiance: Some([0.0; 3]), rotation: None });
+        let change = scene.apply(&Pose { environment, ..Pose::default() }).unwrap();
+        film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+        film.frame(film.camera);
+        assert_eq!(rim(&film), 0, "{way:?}");
+    }
     assert_silent(&gpu);
 }
 

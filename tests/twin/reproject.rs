@@ -142,7 +142,8 @@ fn both_where_all_moves(
     let previous = film.camera;
     let change = scene.apply(pose).unwrap();
     let flags = [&change.instance_now, &change.triangle_now].map(|now| u32::from(!now.is_empty()));
-    let push = ReprojectPush { moved: 1, instances: flags[0], triangles: flags[1], ..push(scene, settings) };
+    let sky = change.changes_sky(scene).into();
+    let push = ReprojectPush { moved: 1, sky, instances: flags[0], triangles: flags[1], ..push(scene, settings) };
     let (instance_now, triangle_now) = (&change.instance_now[..], &change.triangle_now[..]);
     let leaving =
         Reprojection { before: &before, scene, instance_now, triangle_now, changes: &[], previous, camera, push };

@@ -104,6 +104,8 @@ pub struct History {
     no_change: Buffer<LightChange>,
     /// Whether more than the camera has changed since the last frame.
     changed: AtomicBool,
+    /// Whether the light of the sky has, by that change.
+    sky: bool,
     /// The camera of the last frame, none where nothing of it may be carried.
     last: Mutex<Option<Camera>>,
     settings: Reproject,
@@ -177,6 +179,7 @@ impl History {
             probes,
             no_change: Buffer::from_slice(gpu, "no changes of light", &[])?,
             changed: AtomicBool::new(false),
+            sky: false,
             last: Mutex::new(None),
             settings,
             spp,
@@ -194,6 +197,7 @@ impl History {
         self.changed.store(true, Relaxed);
         let Some(probes) = &mut self.probes else { return Ok(()) };
         self.numbers.note(rec, change)?;
+        self.sky = change.changes_sky(scene);
         let relit = change.lights.then(|| Relit::of(&change.lights_before, scene)).flatten();
         probes.note(rec, relit.as_ref(), c, first_sample)
     }
@@ -251,6 +255,7 @@ impl History {
             max_age: s.reproject_age,
             spp: self.spp,
             moved: self.has_changed().into(),
+            sky: (self.has_changed() && self.sky).into(),
             instances,
             triangles,
             ..Default::default()
