@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::gpu::{Gpu, Kernel, Recorder};
 use crate::layout::{Guide, NONE, PriorityPush};
 use crate::math::portable::{exp_negative, squared_distance};
-use crate::settings::{ABOVE_0, settings};
+use crate::settings::{FINITE_ABOVE_0, settings};
 use crate::shaders::geometry::Bind;
 use crate::shaders::shared::similarity::SIMILARITY_UNIT;
 use serde::Serialize;
@@ -30,9 +30,9 @@ settings! {
             /// Edge of the square of pixels whose geometry is compared.
             window: u32 = 4, 2..=10;
             /// Difference of unit normals that counts as e^-1 alike.
-            sigma_normal: f32 = 0.35, ABOVE_0;
+            sigma_normal: f32 = 0.35, FINITE_ABOVE_0;
             /// Distance of hits that counts as e^-1 alike, in diagonals of the scene.
-            sigma_position: f32 = 0.003, ABOVE_0;
+            sigma_position: f32 = 0.003, FINITE_ABOVE_0;
         }
     }
 }

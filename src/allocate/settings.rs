@@ -5,7 +5,7 @@ use super::variance::{VarianceOverrides, VarianceSettings};
 use super::{Placing, Policy, uniform};
 use crate::error::{Error, Result};
 use crate::settings::entry::Value;
-use crate::settings::{FROM_0, settings};
+use crate::settings::{FINITE_FROM_0, settings};
 use serde::{Deserialize, Serialize};
 
 impl Value for &'static Policy {
@@ -30,7 +30,7 @@ settings! {
             /// Rounds that the budget is spread over; 0: one, of policies that learn one for every 2 samples a pixel, up to 4.
             rounds: u32 = 0, 0..=4096;
             /// Stop when every pixel's relative error is estimated below this, or at --max-spp (else --spp); 0 is off.
-            noise_threshold: f32 = 0.0, FROM_0;
+            noise_threshold: f32 = 0.0, FINITE_FROM_0;
             ..geometry: GeometrySettings, GeometryOverrides, [serde(flatten)];
             ..variance: VarianceSettings, VarianceOverrides, [serde(flatten)];
             ..both: BothSettings, BothOverrides, [serde(flatten)];

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
 use crate::math::srgb::luminance;
-use crate::settings::{NUMBER, settings};
+use crate::settings::{FINITE, settings};
 use crate::shaders::shared::pixel_noise::{MAX_LUMINANCE, PRIOR_SAMPLES};
 use crate::shaders::variance::Bind;
 use serde::Serialize;
@@ -27,7 +27,7 @@ settings! {
         /// The settings of [`VarianceSettings`] that are given; the others are `None`.
         VarianceOverrides {
             /// Luminance added before noise is compared with it; negative: noise counts by itself.
-            luminance_floor: f32 = 0.05, NUMBER;
+            luminance_floor: f32 = 0.05, FINITE;
         }
     }
 }

@@ -113,7 +113,7 @@ mod tests {
         let command = Command::command();
         let help = |name: &str| command.get_arguments().find(|a| a.get_long() == Some(name)).unwrap().get_help();
         assert_eq!(help("width").unwrap().to_string(), "Film width in pixels [1 to 16384] [default: 512]");
-        assert!(help("sigma-normal").unwrap().to_string().ends_with(" [a number above 0] [default: 0.35]"));
+        assert!(help("sigma-normal").unwrap().to_string().ends_with(" [a finite number above 0] [default: 0.35]"));
         assert!(help("filter").unwrap().to_string().ends_with(" [default: box]"));
         for name in command.get_arguments().filter_map(|a| a.get_long()).filter(|&name| name != "help") {
             let text = help(name).unwrap().to_string();

@@ -4,7 +4,7 @@ pub mod entry;
 mod range;
 mod table;
 
-pub use range::{ABOVE_0, FINITE_ABOVE_0, FINITE_FROM_0, FROM_0, Is, NUMBER, Range};
+pub use range::{FINITE, FINITE_ABOVE_0, FINITE_FROM_0, FROM_0, Is, Range};
 pub use table::{Table, read};
 
 /// Declares structs of settings, one row per setting:

@@ -45,13 +45,11 @@ impl<T> Range<T> for Is<T> {
     }
 }
 
-/// Numbers above 0, including infinity.
-pub const ABOVE_0: Is<f32> = Is("a number above 0", |&x| x > 0.0);
 /// Numbers of 0 or more, including infinity.
 pub const FROM_0: Is<f32> = Is("0 or more", |&x| x >= 0.0);
 /// Numbers above 0, excluding infinity.
 pub const FINITE_ABOVE_0: Is<f32> = Is("a finite number above 0", |&x| x > 0.0 && x.is_finite());
 /// Numbers of 0 or more, excluding infinity.
 pub const FINITE_FROM_0: Is<f32> = Is("a finite number of 0 or more", |&x| x >= 0.0 && x.is_finite());
-/// All numbers, including the infinities but not NaN.
-pub const NUMBER: Is<f32> = Is("a number", |&x| !x.is_nan());
+/// Numbers of either sign. What a film's metadata tell is finite, as JSON has no infinity.
+pub const FINITE: Is<f32> = Is("a finite number", |&x| x.is_finite());
