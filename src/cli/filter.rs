@@ -213,6 +213,9 @@ fn check_filter(args: &Args) -> Result<()> {
             "--scene looks filtered indirect light up, but oidn filters the colour whole: choose another --filter";
         return Err(Error::Usage(what.to_owned()));
     }
+    if matches!(args.filter, Method::Oidn) && args.light.is_some() {
+        return Err(Error::Usage("--light is for filters of Tallow's own: oidn filters the colour whole".to_owned()));
+    }
     args.filter.check()
 }
 

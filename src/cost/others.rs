@@ -2,9 +2,11 @@
 use super::document::{Method, Point, Run};
 use super::judge::judge;
 use super::reference::Reference;
+use crate::allocate::POLICIES;
 use crate::error::{Error, Result};
 use crate::image::{self, Picture, input};
 use serde::Deserialize;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Bytes of memory that a byte of a table takes at most while it is read.
@@ -53,10 +55,23 @@ pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
         if !(ms.is_finite() && ms > 0.0) {
             return Err(wrong(format!("a time of {ms} ms: give a number above 0")));
         }
+        if spp == 0 {
+            return Err(wrong(format!("{method} took 0 samples a pixel: give a number from 1")));
+        }
+        if POLICIES.iter().any(|policy| policy.name == method) {
+            return Err(wrong(format!("{method} is a policy of Tallow's own: give the renderer another name")));
+        }
         let method = Method { allocate: method, filter, rounds: None, reproject: None, options: Vec::new(), spp };
         Ok(OtherRun { method, seed, ms, image: path.parent().unwrap_or(Path::new("")).join(image) })
     };
-    csv::Reader::from_reader(&text[..]).deserialize().map(run).collect()
+    let runs: Vec<OtherRun> = csv::Reader::from_reader(&text[..]).deserialize().map(run).collect::<Result<_>>()?;
+    let mut seen = HashSet::new();
+    match runs.iter().find(|run| !seen.insert((run.method.label(), run.seed))) {
+        Some(again) => {
+            Err(wrong(format!("{} has seed {} twice: a seed tells its runs apart", again.method.label(), again.seed)))
+        }
+        None => Ok(runs),
+    }
 }
 
 /// The points of these runs, judged, each with its first image. A point with an image that cannot be judged has failed.
@@ -166,6 +181,9 @@ mod tests {
         says("method,filter,spp,seed,ms,image\nA,none,4,7,0,a.exr\n", "a time of 0 ms");
         says("method,filter,spp,seed,ms,image\nA,none,4,7,inf,a.exr\n", "a time of inf ms");
         says("method,filter,spp,seed,ms,image\nA,none,x,7,1,a.exr\n", "line: 2");
+        says("method,filter,spp,seed,ms,image\nA,none,0,7,1,a.exr\n", "A took 0 samples a pixel");
+        says("method,filter,spp,seed,ms,image\nuniform,none,4,7,1,a.exr\n", "uniform is a policy");
+        says("method,filter,spp,seed,ms,image\nA,none,4,7,1,a.exr\nA,none,4,7,2,b.exr\n", "A, 4 spp has seed 7 twice");
         says("method,filter,spp,seed,ms,image\nA,none,4,7\n", "line: 2");
         says("method,spp\nA,4\n", "missing field");
     }

@@ -2,6 +2,7 @@
 use super::document::{NoiseKind, ReferenceInfo, ReferenceSource};
 use super::judge::Noise;
 use crate::error::{Error, Result};
+use crate::image::aov::{Aovs, Names};
 use crate::image::metrics;
 use crate::image::primaries::is_rec709;
 use crate::image::{self, Film, Picture};
@@ -64,8 +65,9 @@ fn bound(film: &Film, picture: &Picture) -> Option<Noise> {
     if film.primaries.is_some_and(|own| !is_rec709(&own)) {
         return None;
     }
-    let variance = film.picture(Some("variance")).ok().filter(|variance| variance.non_finite() == 0)?;
-    let noise = noise_of(picture, &variance.pixels);
+    let aovs = Aovs::find(film, &Names::new()).ok()?;
+    let variance = (0..film.pixels()).map(|i| aovs.variance(i)).collect::<Option<Vec<_>>>()?;
+    let noise = variance.iter().flatten().all(|v| v.is_finite()).then(|| noise_of(picture, &variance))?;
     (noise.mse > 0.0).then_some(noise)
 }
 
@@ -77,11 +79,27 @@ pub fn noise_of(picture: &Picture, variance: &[[f32; 3]]) -> Noise {
 
 /// Settings that change the expected image and that a file was rendered with other values of.
 fn differences(of_file: &serde_json::Value, settings: &Settings) -> Vec<String> {
-    let ours = serde_json::to_value(settings).unwrap_or_default();
+    // By way of text: a number's shortest decimal is not its value in double precision.
+    let text = serde_json::to_string(settings).unwrap_or_default();
+    let ours: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
     let differs = |key: &&str| of_file.get(*key).is_some_and(|value| ours.get(*key) != Some(value));
     let note = |key: &str| {
         let (theirs, ours) = (&of_file[key], &ours[key]);
         format!("the reference was rendered with {} {theirs} instead of {ours}", key.replace('_', "-"))
     };
     ["filter", "max_depth", "clamp_indirect", "indirect_stride"].into_iter().filter(differs).map(note).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_the_same_settings_differs_in_none() {
+        let settings = Settings { clamp_indirect: 0.1, max_depth: 5, ..Settings::default() };
+        let of_file = serde_json::from_str(&serde_json::to_string(&settings).unwrap()).unwrap();
+        assert_eq!(differences(&of_file, &settings), Vec::<String>::new());
+        let deeper = Settings { max_depth: 6, ..settings };
+        assert_eq!(differences(&of_file, &deeper), ["the reference was rendered with max-depth 5 instead of 6"]);
+    }
 }

@@ -10,10 +10,10 @@ const BY_CHANCE: f64 = 3.0;
 /// A line for the user where `clean`, which a filter made of the image, has less light than it, by more than chance explains. `None` also
 /// where the image does not tell its variance.
 pub fn note_of_lost_light(aovs: &Aovs, clean: &Colour) -> Option<String> {
-    let (noisy, variance) = (aovs.get(Aov::Colour)?, aovs.get(Aov::Variance)?);
+    let noisy = aovs.get(Aov::Colour)?;
     let [mut before, mut after, mut squares] = [0.0; 3];
     for i in (0..clean[0].len()).filter(|&i| aovs.holds(i)) {
-        let (noisy, variance) = (noisy.at(i), variance.at(i));
+        let (noisy, variance) = (noisy.at(i), aovs.variance(i)?);
         if noisy.iter().chain(&variance).all(|v| v.is_finite()) {
             before += noisy.map(f64::from).iter().sum::<f64>();
             after += clean.iter().map(|plane| f64::from(plane[i])).sum::<f64>();

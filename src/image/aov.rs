@@ -111,8 +111,9 @@ pub struct Aovs<'a> {
     pub colour: [&'a str; 3],
     planes: BTreeMap<Aov, Plane<'a>>,
     window: Option<Window>,
-    /// Samples of every pixel, where the user has told a number.
-    pub samples_of_all: Option<f32>,
+    samples_of_all: Option<f32>,
+    /// Whether [`Aov::Variance`] is that of one sample and not of the pixel's mean.
+    of_one_sample: bool,
     /// One line per AOV, with the name under which it was found, or that it is missing; and what is wrong with the
     /// colour.
     pub notes: Vec<String>,
@@ -143,16 +144,18 @@ impl<'a> Aovs<'a> {
             .find(given.filter(|name| !is_noisy(name)))
             .ok_or_else(|| film.picture(given).err().unwrap_or_default())?;
         let view = split(split(&shown[0].name).0).0;
+        let told = names.get(&Aov::Samples).and_then(|told| number(told));
         let mut found = Self {
             film,
             colour: shown.map(|c| c.name.as_str()),
             planes: BTreeMap::new(),
             window: shown[0].window,
-            samples_of_all: names.get(&Aov::Samples).and_then(|told| number(told)),
+            samples_of_all: None,
+            of_one_sample: film.channels.iter().any(|c| c.name.starts_with("RelativeVariance.")),
             notes: Vec::new(),
         };
         for known in all {
-            if let (Aov::Samples, Some(number)) = (known.aov, found.samples_of_all) {
+            if let (Aov::Samples, Some(number)) = (known.aov, told) {
                 found.notes.push(format!("samples: {number} in every pixel, as given"));
                 continue;
             }
@@ -164,6 +167,7 @@ impl<'a> Aovs<'a> {
             let channels = channels.or_else(|| (known.aov == Aov::Colour).then_some(shown));
             found.take(known, channels)?;
         }
+        found.samples_of_all = told.or_else(|| samples_of_head(film, found.colour[0]));
         found.check_colour()?;
         Ok(found)
     }
@@ -222,6 +226,19 @@ impl<'a> Aovs<'a> {
         (is_shown && !has_one).then_some(NOISY)
     }
 
+    /// Samples of a pixel, as far as the file or the user tells: its own, or those of all, which pbrt and Cycles write into the head.
+    pub fn samples(&self, pixel: usize) -> Option<f32> {
+        let share = || self.scalar(Aov::ShareOfSamples, pixel).unwrap_or(1.0);
+        self.scalar(Aov::Samples, pixel).or_else(|| Some(share() * self.samples_of_all?))
+    }
+
+    /// Squared standard error of a pixel's radiance, if the file has it: pbrt stores the variance of one sample.
+    pub fn variance(&self, pixel: usize) -> Option<[f32; 3]> {
+        let stored = self.get(Aov::Variance)?.at(pixel);
+        let n = if self.of_one_sample { self.samples(pixel).unwrap_or(1.0).max(1.0) } else { 1.0 };
+        Some(stored.map(|v| v / n))
+    }
+
     /// The first of the three values of a pixel.
     pub fn scalar(&self, aov: Aov, pixel: usize) -> Option<f32> {
         self.get(aov).map(|plane| plane.at(pixel)[0])
@@ -253,6 +270,14 @@ pub fn is_noisy(layer: &str) -> bool {
 /// Whether Tallow wrote the file; other programs may use the same names for something else.
 fn is_tallow_s(film: &Film) -> bool {
     film.metadata.get(SOFTWARE).is_some_and(|name| name.starts_with("tallow "))
+}
+
+/// What the head of a file tells of the samples of every pixel, by pbrt's name or that of Cycles for the view layer of the colour.
+fn samples_of_head(film: &Film, colour: &str) -> Option<f32> {
+    let of_view = |view: &str| format!("cycles.{view}.samples");
+    let view = colour.rsplitn(3, '.').nth(2).map(of_view);
+    let told = ["samplesPerPixel".to_owned()].into_iter().chain(view);
+    told.filter_map(|key| film.metadata.get(&key)?.parse().ok()).find(|n: &f32| n.is_finite() && *n > 0.0)
 }
 
 /// Finds a layer in the view layer of the colour, or else anywhere.
@@ -364,6 +389,14 @@ mod tests {
         let expected =
             [(Aov::Colour, 0.0), (Aov::Albedo, 3.0), (Aov::Normal, 14.0), (Aov::Position, 6.0), (Aov::Variance, 19.0)];
         assert_eq!(found(&file), expected);
+        // Its variance is that of one sample, of as many as the head tells.
+        let variance = |file: &Film| Aovs::find(file, &Names::new()).unwrap().variance(0).unwrap()[0];
+        assert_eq!(variance(&file), 19.0);
+        let mut told = file.clone();
+        told.metadata.insert("samplesPerPixel".to_owned(), "4".to_owned());
+        assert_eq!(variance(&told), 4.75);
+        told.channels.retain(|channel| !channel.name.starts_with("RelativeVariance."));
+        assert_eq!(variance(&told), 19.0, "of another program");
     }
 
     #[test]
@@ -395,7 +428,7 @@ mod tests {
         let file = film("R G B samples");
         let find = |told: &str| Aovs::find(&file, &Names::from([(Aov::Samples, told.to_owned())]));
         let aovs = find("32").unwrap();
-        assert!(aovs.samples_of_all == Some(32.0) && aovs.get(Aov::Samples).is_none());
+        assert!(aovs.samples(0) == Some(32.0) && aovs.get(Aov::Samples).is_none());
         assert!(aovs.notes.contains(&"samples: 32 in every pixel, as given".to_owned()), "{:?}", aovs.notes);
         assert_eq!(find("samples").unwrap().scalar(Aov::Samples, 0), Some(3.0));
         for wrong in ["0", "-1", "inf", "nan", "spp"] {

@@ -48,6 +48,10 @@ const SRGB: [u8; 13] = *b"\0\0\0\x01sRGB\0\xae\xce\x1c\xe9";
 /// holds, and pixels below its smallest exponent become black (the encoder would let that wrap around). All others are rounded here,
 /// since the encoder cuts off.
 pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
+    // The encoder marks rows of this width by a byte that every reader takes for a pixel.
+    if picture.width == 32768 {
+        return Err("is 32768 pixels wide, which HDR files cannot be: write an .exr".to_owned());
+    }
     const LARGEST: f32 = 255.0 * (1u128 << 119) as f32;
     const SMALLEST: f32 = f32::MIN_POSITIVE;
     let held = |p: &[f32; 3]| {

@@ -279,6 +279,14 @@ fn filters_are_measured_on_a_given_image() {
     assert!(within(&folder, &format!("{words} --quiet")).status().unwrap().success());
     let picture = |name: &str| image::read(&folder.path().join(name)).unwrap().picture(None).unwrap();
     assert!((relmse(&picture("point.exr"), &picture("clean.exr")) / error(2) - 1.0).abs() < 1e-9);
+    // Beside itself an image in other primaries has no error.
+    let mut wide = image::read(&folder.path().join("noisy.exr")).unwrap();
+    wide.primaries = Some([[0.708, 0.292], [0.17, 0.797], [0.131, 0.046], [0.3127, 0.329]]); // Rec. 2020
+    image::write(&folder.path().join("wide.exr"), &wide, &image::WriteOptions::default()).unwrap();
+    let words = "cost --filter-only wide.exr --reference wide.exr --denoise none --repeats 2 -o wide";
+    text(&within(&folder, words).output().unwrap(), 0);
+    let error = self::document(&folder, "wide/cost.json").points[0].runs[0].errors.relmse.unwrap();
+    assert!(error < 1e-9, "{error}");
 }
 
 #[test]

@@ -140,6 +140,8 @@ fn what_it_cannot_do_is_told() {
     write_noisy(&folder, true);
     let words = ["filter", "noisy.exr", "-o", "clean.exr", "--filter", "oidn", "--scene", "scene.toml"];
     complains(&with(&FAKE, &folder, &words), 2, &["--scene", "oidn"]);
+    let words = ["filter", "noisy.exr", "-o", "clean.exr", "--filter", "oidn", "--light", "indirect"];
+    complains(&with(&FAKE, &folder, &words), 2, &["--light", "oidn"]);
 }
 
 /// TALLOW_OIDN names Open Image Denoise itself.

@@ -118,6 +118,11 @@ fn what_cannot_be_tested_is_one_line() {
     once.channels.retain(|c| c.name != "samples");
     once.add("samples", Samples::U32(vec![1; 1024]));
     save(&once, "once.exr");
+    let mut wide = image::read(&folder.path().join("b.exr")).unwrap();
+    wide.primaries = Some([[0.708, 0.292], [0.17, 0.797], [0.131, 0.046], [0.3127, 0.329]]); // Rec. 2020
+    save(&wide, "wide.exr");
+    complains(&compare(&folder, "a.exr wide.exr"), 3, &["wide.exr", "other primaries"]);
+    assert_eq!(compare(&folder, "wide.exr wide.exr").status.code(), Some(0));
     complains(&compare(&folder, "a.exr small.exr"), 3, &["32x32", "16x16"]);
     complains(&compare(&folder, "a.exr nan.exr"), 3, &["nan.exr", "each of its 1024 pixels"]);
     complains(&compare(&folder, "a.exr bare.exr"), 3, &["bare.exr", "does not say how noisy", "--errors"]);

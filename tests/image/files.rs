@@ -271,6 +271,22 @@ fn light_too_little_for_hdr_is_black() {
     assert!(read[..2].iter().flatten().all(|&v| v <= 1e-38) && (read[2][0] - 1.0).abs() < 0.01, "{read:?}");
 }
 
+/// Its rows would begin as those of files without lengths do.
+#[test]
+fn an_hdr_file_of_32768_columns_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (width, fits) in [(32767, true), (32768, false), (32769, true)] {
+        let (path, mut film) = (folder.path().join("a.hdr"), Film::new(width, 1));
+        film.add_vec3("", ["R", "G", "B"], &(0..width).map(|x| [x as f32; 3]).collect::<Vec<_>>());
+        let written = image::write(&path, &film, &WriteOptions::default());
+        assert_eq!(written.is_ok(), fits, "{width}: {written:?}");
+        if fits {
+            let read = image::read(&path).unwrap().picture(None).unwrap();
+            assert!((read.pixels[9000][0] - 9000.0).abs() < 40.0, "{width}: {:?}", read.pixels[9000]);
+        }
+    }
+}
+
 #[test]
 fn a_png_says_that_it_is_srgb() {
     let folder = tempfile::tempdir().unwrap();

@@ -196,6 +196,14 @@ fn what_does_not_tell_its_noise_is_refused() {
     let mut filtered = good.clone();
     filtered.metadata.insert("filtered".to_owned(), "atrous".to_owned());
     refused(&filtered, "atrous");
+    // pbrt tells the variance of one sample, and how many there are in the head.
+    let mut of_pbrt = Film::new(5, 4);
+    of_pbrt.add_vec3("", ["R", "G", "B"], &[[1.0; 3]; 20]);
+    of_pbrt.add_vec3("Variance", ["R", "G", "B"], &[[0.5; 3]; 20]);
+    of_pbrt.add_vec3("RelativeVariance", ["R", "G", "B"], &[[0.5; 3]; 20]);
+    of_pbrt.metadata.insert("samplesPerPixel".to_owned(), "16".to_owned());
+    let Noise::Samples { m2, count } = Estimate::of_film(&of_pbrt).unwrap().noise else { panic!("no samples") };
+    assert_eq!((m2[7], count[7]), ([7.5; 3], 16.0), "m2 / (n - 1) is the variance of a sample");
     // With the noisy image beside the filtered one, that is what counts.
     filtered.add_vec3("Noisy Image", ["R", "G", "B"], &[[2.0; 3]; 20]);
     assert_eq!(Estimate::of_film(&filtered).unwrap().mean[0], [2.0; 3]);

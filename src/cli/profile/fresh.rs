@@ -28,19 +28,22 @@ pub struct Fresh {
 /// # Errors
 /// As a render of the scene; [`Error::Usage`] for an old profile of something else.
 pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
-    let filter = args.denoise.map(row).transpose()?;
+    args.denoise.map(row).transpose()?;
     let mut file = SceneFile::open(&args.scene)?;
     file.stays_still();
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
     settings.validate()?;
+    // As of a render: without gaps to fill in there is nothing to do for `none`.
+    let denoise = args.denoise.filter(|method| !method.is_none() || settings.indirect_stride > 1);
+    let filter = denoise.map(row).transpose()?;
     let scene = file.load()?.scene;
     args.common.warn(&scene.warnings);
     if let Some(old) = old {
         check_beside(old, &scene, &settings, filter)?;
     }
     let gpu = args.common.open(args.tracing.unwrap_or_default())?;
-    render::check_room(args.denoise, &settings, &gpu)?;
+    render::check_room(denoise, &settings, &gpu)?;
     let count = usize::from(args.frames.unwrap_or(FRAMES));
     let bar = ProgressBar::new(2 * count as u64 + 1);
     if !args.common.talkative() {

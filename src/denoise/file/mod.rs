@@ -21,10 +21,6 @@ pub struct Layers<'a> {
     reflects: bool,
     indirect_m2: Option<&'a [f32]>,
     blur: Option<&'a [f32]>,
-    /// Told by the user, or by the file's head, into which pbrt and Cycles write it.
-    samples_of_all: Option<f32>,
-    /// pbrt stores the variance of one sample, others that of each pixel's mean.
-    of_one_sample: bool,
     /// What had to be made up: one line each.
     pub notes: Vec<String>,
 }
@@ -47,8 +43,6 @@ impl<'a> Layers<'a> {
             reflects: false,
             indirect_m2: film.floats(INDIRECT_M2),
             blur: film.floats(BLUR),
-            samples_of_all: samples_of_all(aovs),
-            of_one_sample: film.channels.iter().any(|c| c.name.starts_with("RelativeVariance.")),
             notes,
         };
         layers.reflects = layers.judge_albedo();
@@ -105,11 +99,8 @@ impl<'a> Layers<'a> {
     /// Colour and variance with their samples: those of the pixel, or of all; `UNTOLD` where the file does not say; 0 where it
     /// holds nothing.
     pub fn stats(&self, i: usize) -> PixelStats {
-        let share = || self.aovs.scalar(Aov::ShareOfSamples, i).unwrap_or(1.0);
-        let said = self.aovs.scalar(Aov::Samples, i).or_else(|| Some(share() * self.samples_of_all?));
-        let count = if self.aovs.holds(i) { said.unwrap_or(UNTOLD) } else { 0.0 };
-        let stored = self.aovs.get(Aov::Variance).map_or([0.0; 3], |plane| plane.at(i));
-        let m2 = if self.of_one_sample { stored.map(|v| v / said.unwrap_or(1.0).max(1.0)) } else { stored };
+        let count = if self.aovs.holds(i) { self.aovs.samples(i).unwrap_or(UNTOLD) } else { 0.0 };
+        let m2 = self.aovs.variance(i).unwrap_or_default();
         let mean = self.aovs.get(Aov::Colour).map_or([0.0; 3], |plane| plane.at(i));
         PixelStats { mean, count: count.to_bits(), m2, ..Default::default() }
     }
@@ -154,16 +145,6 @@ impl<'a> Layers<'a> {
 /// Samples that a pixel is taken to have where its file does not say. Of fewer `auto` trusts neither the image nor svgf: a Cycles file of
 /// 64 samples, taken for one, came out with more error than it had.
 const UNTOLD: f32 = 4.0;
-
-/// What the user or the head of a file tells of the samples of every pixel; a head by pbrt's name or that of Cycles for
-/// the view layer of the colour.
-fn samples_of_all(aovs: &Aovs) -> Option<f32> {
-    let of_view = |view: &str| format!("cycles.{view}.samples");
-    let view = aovs.colour[0].rsplitn(3, '.').nth(2).map(of_view);
-    let told = ["samplesPerPixel".to_owned()].into_iter().chain(view);
-    let of_head = || told.filter_map(|key| aovs.film.metadata.get(&key)?.parse().ok());
-    aovs.samples_of_all.or_else(|| of_head().find(|n: &f32| n.is_finite() && *n > 0.0))
-}
 
 /// 0 where there is none, or what there is is no number.
 fn vector(aovs: &Aovs, aov: Aov, i: usize) -> Vec3 {

@@ -1,5 +1,5 @@
 //! What a file says of an image's expectation: means, and how far they may be off.
-use crate::image::aov::{Aov, Aovs, Names};
+use crate::image::aov::{Aovs, Names};
 use crate::image::{FILTERED, Film, Picture};
 
 /// How far the mean of a pixel may be from its expectation.
@@ -40,10 +40,11 @@ impl Estimate {
         let mean = mean(film)?;
         let aovs = Aovs::find(film, &Names::new())?;
         let pixels = 0..film.pixels();
-        let layer = |aov| aovs.get(aov).map(|plane| pixels.clone().map(|i| plane.at(i)).collect::<Vec<_>>());
-        let count = layer(Aov::Samples).map(|c| c.into_iter().map(|[n, _, _]| n).collect::<Vec<_>>());
+        // Where the file has no such layer its head may tell: how noisy the variances themselves are depends on it.
+        let count = pixels.clone().map(|i| aovs.samples(i)).collect::<Option<Vec<_>>>();
+        let variance = pixels.clone().map(|i| aovs.variance(i)).collect::<Option<Vec<_>>>();
         let m2 = film.picture(Some("m2")).ok().filter(|_| aovs.is_tallow_s()).map(|m2| m2.pixels);
-        let noise = match (m2, count, layer(Aov::Variance)) {
+        let noise = match (m2, count, variance) {
             (Some(m2), Some(count), _) => Noise::Samples { m2, count },
             (None, Some(count), Some(variance)) => Noise::Samples { m2: m2_of(&variance, &count), count },
             (_, None, Some(variance)) => Noise::SquaredErrors(variance),
