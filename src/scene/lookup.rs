@@ -16,7 +16,8 @@ pub fn reads_second(scene: &Scene, image: u32) -> bool {
 
 /// Coordinates at which a point of a triangle reads a picture; `barycentric` weighs vertices 1 and 2.
 pub fn triangle_coordinates(scene: &Scene, image: u32, triangle: u32, barycentric: Vec2) -> Vec2 {
-    let s = &scene.shading[triangle as usize];
+    // Where no triangle has any, kernels read all pictures at their origin.
+    let Some(s) = scene.shading.get(triangle as usize) else { return Vec2::ZERO };
     let second = Attributes::of(scene, s).second_coordinates().filter(|_| reads_second(scene, image));
     let [uv0, uv1, uv2] = second.unwrap_or([s.uv0, s.uv1, s.uv2].map(Vec2::from));
     uv0 + barycentric.x * (uv1 - uv0) + barycentric.y * (uv2 - uv0)

@@ -1,6 +1,7 @@
 //! Tests of the `[[animation]]` tables: where they put things, and the messages about mistakes.
 use std::fs;
 use std::path::Path;
+use tallow::image::{self, Film, WriteOptions};
 use tallow::scene::{Loaded, MaterialChange, Pose, Scene, effects};
 
 const STAGE: &str = "
@@ -98,6 +99,24 @@ fn a_place_with_shear_keeps_it_where_keys_move_it() {
     assert!(line.contains("shear") && line.contains("give both"), "{line}");
     let whole = pose(&tables("{ time = 0, rotate = [0, 0, 90], scale = 1 }"), 0.0).instances[0].1.0;
     assert!(whole.matrix3.x_axis.abs_diff_eq(glam::DVec3::Y, 1e-12), "{whole:?}");
+}
+
+/// A picture of a sky is there for keys that light it up, however dark its table makes it.
+#[test]
+fn a_sky_that_begins_dark_can_be_lit() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = Film::new(4, 2);
+    film.add_vec3("", ["R", "G", "B"], &[[1.0; 3]; 8]);
+    image::write(&folder.path().join("sky.exr"), &film, &WriteOptions::default()).unwrap();
+    let text = "[environment]\nfile = \"sky.exr\"\nscale = 0\n[[mesh]]\nshape = \"cube\"\n[[animation]]\nenvironment = true\n\
+                keys = [{ time = 0, radiance = 0 }, { time = 1, radiance = 1 }]\n";
+    let loaded = Scene::parse(&folder.path().join("s.toml"), text).unwrap();
+    let mut scene = loaded.scene;
+    let lit = |scene: &Scene| scene.lights.iter().any(|light| light.value == [1.0; 3]);
+    for (time, expected) in [(0.0, false), (1.0, true), (0.0, false)] {
+        scene.apply(&loaded.animation.at(time).unwrap()).unwrap();
+        assert_eq!(lit(&scene), expected, "at {time} s");
+    }
 }
 
 /// Several scales and rotations make one matrix where scales are negative: what keys leave out is what the table says.

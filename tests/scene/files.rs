@@ -30,6 +30,18 @@ fn render(folder: &TempDir, scene: &str, kib: u32, before: &str) -> Output {
     shell.args(["-c", &line, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path()).output().unwrap()
 }
 
+/// Without coordinates every point reads a picture at its origin.
+#[test]
+fn pictures_of_lamps_need_no_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let lamp = "mtllib lamp.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl lamp\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    std::fs::write(folder.path().join("lamp.obj"), lamp).unwrap();
+    std::fs::write(folder.path().join("lamp.mtl"), "newmtl lamp\nKe 1 1 1\nmap_Ke a.png\n").unwrap();
+    image::RgbImage::from_pixel(2, 2, image::Rgb([255; 3])).save(folder.path().join("a.png")).unwrap();
+    let scene = Scene::load(&folder.path().join("lamp.obj")).unwrap();
+    assert!(scene.has_light_tree() && scene.shading.is_empty());
+}
+
 #[test]
 fn a_library_is_read_once_however_often_it_is_named() {
     let mtl: String = (0..2000).map(|i| format!("newmtl m{i}\nKd 1 0 0\n")).collect();

@@ -199,6 +199,23 @@ fn models_of_one_name_stay_apart() {
     assert!(stays(&loaded, [10.0, 50.0, 0.0]) && stays(&loaded, [20.0, 0.0, 0.0]) && !stays(&loaded, [20.0, 0.0, 7.0]));
 }
 
+/// Exporters call materials alike; an MTL file's are its own, unless the scene has one of the name.
+#[test]
+fn a_model_takes_the_place_of_no_material_of_an_obj_file() {
+    let folder = folder();
+    let obj = "mtllib leaf.mtl\nv 0 0 5\nv 1 0 5\nv 0 1 5\nusemtl red\nf 1 2 3\n";
+    std::fs::write(folder.path().join("leaf.obj"), obj).unwrap();
+    std::fs::write(folder.path().join("leaf.mtl"), "newmtl red\nKd 0 0.25 0\n").unwrap();
+    let color = |scene: &Scene| {
+        let leaf = scene.triangles.iter().find(|t| t.v0 == [0.0, 0.0, 5.0]).unwrap();
+        scene.materials[leaf.material as usize].base_color
+    };
+    let text = format!("{SCENE}[[mesh]]\nfile = 'leaf.obj'\n");
+    assert_eq!(color(&parse(folder.path(), &text).unwrap()), [0.0, 0.25, 0.0]);
+    let own = format!("{text}[[material]]\nname = 'red'\ncolor = [0.75, 0, 0]\n");
+    assert_eq!(color(&parse(folder.path(), &own).unwrap()), [0.75, 0.0, 0.0]);
+}
+
 #[test]
 fn what_a_model_cannot_have_is_named() {
     let folder = folder();

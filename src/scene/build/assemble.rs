@@ -70,8 +70,9 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     add_appearance(scene);
     coat::add_tables(&mut scene.materials, &mut scene.texels);
     lights::finish(scene)?;
-    // A constant sky without light may be given some by a pose.
-    if scene.environment.is_some() && !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
+    // A sky without light may be given some by a pose: a constant one, or one that keys change.
+    let stays = description.animation.iter().any(|table| table.environment);
+    if !stays && scene.environment.is_some() && !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
         scene.environment = None;
         scene.rig.lights.retain(|l| l.kind != LIGHT_ENVIRONMENT);
     }

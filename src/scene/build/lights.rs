@@ -50,7 +50,11 @@ fn tell_brightness(scene: &mut Scene) {
         |light: &&Light| light.is_triangle() && scene.materials[light.material as usize].emission_texture != NONE;
     let told = |light: &Light| (light.triangle as usize, brightness(scene, light) as f32);
     let all: Vec<_> = scene.lights.par_iter().filter(has_picture).map(told).collect();
-    all.into_iter().for_each(|(triangle, brightness)| scene.shading[triangle].brightness = brightness);
+    for (triangle, brightness) in all {
+        if let Some(record) = scene.shading.get_mut(triangle) {
+            record.brightness = brightness;
+        }
+    }
 }
 
 /// Sets [`Material::emission_weight`] of all materials, and finds the triangles that emit.

@@ -85,7 +85,8 @@ impl<'a> Sources<'a> {
             if table.name.is_empty() {
                 return Err(self.at("[[material]]", "has no name: meshes could not refer to it"));
             }
-            if self.library.tables.insert(table.name.clone(), index).is_some() {
+            let named = if table.of_model { &mut self.library.of_models } else { &mut self.library.tables };
+            if named.insert(table.name.clone(), index).is_some() {
                 return Err(self.at(place, "is defined twice: rename one"));
             }
         }
@@ -140,10 +141,11 @@ impl<'a> Sources<'a> {
     /// # Errors
     /// With the nearest name, when there is none of that name.
     pub fn material(&self, name: &str, place: &str) -> Result<u32> {
-        if let Some(&index) = self.library.tables.get(name) {
+        let [tables, of_models] = [&self.library.tables, &self.library.of_models];
+        if let Some(&index) = tables.get(name).or_else(|| of_models.get(name)) {
             return Ok(index);
         }
-        let remedy = match description::nearest(name, self.library.tables.keys().map(String::as_str)) {
+        let remedy = match description::nearest(name, tables.keys().chain(of_models.keys()).map(String::as_str)) {
             Some(near) => format!("did you mean \"{near}\"?"),
             None => "add a [[material]] table".to_owned(),
         };

@@ -56,6 +56,9 @@ pub enum Distribution {
 pub struct MaterialTable {
     /// What meshes and OBJ files call it; replaces an MTL material of that name.
     pub name: String,
+    /// Whether a glTF file brought it, beside which MTL materials of its name stay.
+    #[serde(skip)]
+    pub of_model: bool,
     /// Kind of the material; default diffuse.
     #[serde(rename = "type")]
     pub kind: Type,

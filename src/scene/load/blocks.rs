@@ -126,7 +126,8 @@ impl<'a> Iterator for Statements<'a> {
         let mut joined = String::new();
         while !self.rest.is_empty() {
             let line = self.line();
-            match line.strip_suffix('\\') {
+            let is_comment = joined.is_empty() && line.trim_start().starts_with('#'); // which may end in a path
+            match line.strip_suffix('\\').filter(|_| !is_comment) {
                 Some(part) => joined.extend([part, " "]),
                 None if joined.is_empty() => return Some((self.lines, line.into())),
                 None => return Some((self.lines, (joined + line).into())),

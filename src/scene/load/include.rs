@@ -153,6 +153,7 @@ impl<'a> Place<'a> {
                 table.name = self.of(&table.name);
             }
             names.insert(asked, table.name.clone());
+            table.of_model = true;
             to.material.push(table);
         }
         names

@@ -23,6 +23,8 @@ pub struct Library {
     pub materials: Materials,
     /// `[[material]]` tables by name: they win over MTL materials.
     pub tables: HashMap<String, u32>,
+    /// Materials of glTF files by name, which MTL materials of that name have nothing to do with.
+    pub of_models: HashMap<String, u32>,
     /// OBJ files whose own materials nothing wears: the MTL files that they name, and their pictures, are not read.
     pub unworn: BTreeSet<PathBuf>,
     /// MTL files that were read, by their canonical path.

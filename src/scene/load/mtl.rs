@@ -172,7 +172,7 @@ fn number(key: &str, rest: &str) -> Checked<f32> {
 
 /// Three numbers, or one for all channels. `spectral` and `xyz` forms have no meaning here.
 fn color(key: &str, rest: &str) -> Checked<[f32; 3]> {
-    let words: Vec<_> = rest.split_whitespace().take(3).collect();
+    let words: Vec<_> = rest.split_whitespace().take_while(|word| !word.starts_with('#')).take(3).collect();
     match words[..] {
         [_] => number(key, rest).map(|v| [v; 3]),
         [r, g, b] => Ok([number(key, r)?, number(key, g)?, number(key, b)?]),
@@ -238,6 +238,7 @@ mod tests {
         let m = one("  Kd 0.1 0.2 0.3\r\nKs 0.5\nNs 10\nTr 0.25\nillum 2\nkE 1 2 3\nunknown x\n# Kd 9 9 9");
         assert_eq!((m.name(), m.directory.as_path()), ("a b", Path::new("dir")));
         assert_eq!(m.block.diffuse, Some([0.1, 0.2, 0.3]));
+        assert_eq!(one("Kd 0.5 # grey").block.diffuse, Some([0.5; 3]));
         assert_eq!((m.block.specular, m.block.emissive), (Some([0.5; 3]), Some([1.0, 2.0, 3.0])));
         assert_eq!(
             (m.block.shininess, m.block.dissolve, m.block.illumination_model),

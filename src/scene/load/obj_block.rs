@@ -91,7 +91,7 @@ impl ObjBlock {
     fn vertex(&mut self, rest: &str) -> Checked {
         let what = "a vertex needs three numbers after v";
         let mut position = numbers(rest, what)?;
-        let mut more = rest.split_ascii_whitespace().skip(3);
+        let mut more = rest.split_ascii_whitespace().skip(3).take_while(|word| !word.starts_with('#'));
         if let (Some(w), None) = (more.next(), more.next()) {
             let [w]: [f32; 1] = numbers(w, what)?;
             if w == 0.0 {
@@ -122,7 +122,8 @@ fn indices(word: &str) -> Checked<Indices> {
     for (i, part) in word.split('/').enumerate() {
         let index = indices.get_mut(i).ok_or_else(|| format!("\"{word}\" has more than two slashes"))?;
         if !part.is_empty() || i == 0 {
-            *index = part.parse().map_err(|_| format!("\"{word}\" is no vertex of a face"))?;
+            let number = part.parse().ok().filter(|&number| number != NO_INDEX);
+            *index = number.ok_or_else(|| format!("\"{word}\" is no vertex of a face"))?;
         }
     }
     Ok(indices)

@@ -69,6 +69,7 @@ fn mistakes_name_their_line() {
     assert!(error("f 1 0 2").contains("vertex 0"));
     assert!(error("f 1 2 6148914691236517205").contains("vertex 6148914691236517205"));
     assert!(error("f 1 2 x").contains("line 10"));
+    assert!(error("f -9223372036854775808 1 2").contains("is no vertex of a face"));
     assert!(error("f").contains("line 10"));
     assert!(error("v 1 2").contains("line 10: a vertex needs three numbers"));
     assert!(read("f 1 2 3").is_ok(), "control");
@@ -102,6 +103,9 @@ fn grey_for_materials_that_a_later_library_defines_is_told() {
 fn statements_may_lack_a_second_coordinate_and_end_in_a_comment() {
     let mesh = &read("vt 0.5 # half\nvt 0.25\nf 1/5 2/6 3/1 # one face").unwrap().parts[0].mesh;
     assert_eq!((mesh.indices.len(), &mesh.uvs[..2]), (3, &[[0.5, 0.0], [0.25, 0.0]][..]));
+    // A comment of one word is no weight, and one that ends in a folder takes no line with it.
+    let mesh = &read("v 0 0 7 #5\n# from D:\\work\\\nv 0 0 8\nf 5 6 1").unwrap().parts[0].mesh;
+    assert_eq!(mesh.positions[..2], [[0.0, 0.0, 7.0], [0.0, 0.0, 8.0]]);
 }
 
 #[test]
