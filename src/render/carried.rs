@@ -50,6 +50,7 @@ impl Renderer {
             return Err(Error::Usage(format!("a film of {found:?} pixels cannot go on as one of {wanted:?}")));
         }
         let lacks = |what: String| Error::Usage(format!("the frame before {what}"));
+        self.check_split(film::splits_light(film).map_err(lacks)?)?;
         let pixels = film::pixels(film).map_err(lacks)?;
         let [samples, age] = [SAMPLES, AGE].map(|name| film::counts(film, name).map_err(lacks));
         let (samples, age) = (samples?, age?);

@@ -101,14 +101,19 @@ impl<'a> Job<'a> {
         let (mut status, mut steps, mut listed) = (self.at_start(), steps.peekable(), u64::MAX);
         let (mut pace, mut left) = (Pace::new(self.step_time, renderer.gpu.info().kind), Vec::new());
         status.times.extend(begun);
+        let mut has_begun = self.checkpoint.is_some() || self.carries;
         while let Some(planned) = pace.next(&mut left, &mut steps) {
             if between(&status)?.is_break() {
+                if !has_begun {
+                    status.times.extend(renderer.run(frame, &Step::Start)?); // a film without a sample
+                }
                 return self.ended(status);
             }
             let step = planned.within(listed);
             if let Some(step) = &step {
                 let begin = Instant::now();
                 let times = renderer.run(frame, step)?;
+                has_begun = true;
                 pace.observe(step, begin.elapsed(), &times);
                 status.times.extend(times);
             }

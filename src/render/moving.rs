@@ -1,7 +1,7 @@
 //! Frames that begin with the samples of the last: what a renderer needs for it, and what became of them.
 use super::carriage::{Carriage, carried_samples};
 use super::history::{History, Moves, Reproject, Reprojection};
-use super::schedule::{self, Begun};
+use super::schedule::{self, Begun, Plan, Share};
 use super::{Renderer, Step, kernels};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, PassTime};
@@ -47,9 +47,16 @@ impl Renderer {
     }
 
     /// The work of a frame that begins with the samples of the last: [`Self::steps`], but for its beginning. Every pixel gets its
-    /// least number of samples anew; [`Self::begin_frame`] counts carried ones.
+    /// least number of samples anew, and the policy's share of the others, however many it carries; [`Self::begin_frame`] counts carried
+    /// ones. So does a largest number of samples, which carried ones may have reached.
     pub fn steps_on(&self) -> impl Iterator<Item = Step> + use<> {
-        std::iter::once(Step::Reproject).chain(self.steps().skip(1))
+        let anew = |step| match step {
+            Step::Allocate(plan) if matches!(plan.share, Share::All(_)) => {
+                Step::Allocate(Plan { share: Share::Next, ..plan })
+            }
+            step => step,
+        };
+        std::iter::once(Step::Reproject).chain(self.steps().skip(1).map(anew))
     }
 
     /// Runs [`Step::Reproject`] and returns the GPU time of its passes and the rest of the frame's work, in which carried samples
@@ -82,8 +89,10 @@ impl Renderer {
         Ok((times, schedule::frame(settings, &self.cut(), begun).collect()))
     }
 
-    /// Chooses the index of each pixel's first sample in its sequence, from the next [`Step::Start`] or [`Step::Reproject`] on.
+    /// Chooses the index of each pixel's first sample in its sequence, from the next [`Step::Start`] or [`Step::Reproject`] on: one has to
+    /// follow.
     pub fn set_first_sample(&mut self, first_sample: u32) {
+        *self.relabelled.get_mut() |= self.settings.first_sample != first_sample;
         self.frame.first_sample = first_sample;
         self.settings.first_sample = first_sample;
     }

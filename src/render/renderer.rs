@@ -14,6 +14,7 @@ use crate::render::schedule::{self, Cut, Step};
 use crate::render::settings::{Sampler, Settings, Split};
 use crate::scene::{self, Fingerprint, Scene};
 use crate::statistics::BrokenSamples;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// What a render leaves in buffers besides radiance and its variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +49,8 @@ pub struct Renderer {
     paths: u32,
     pub(super) soft_lights: bool,
     pub(super) fingerprint: Option<Fingerprint>,
+    /// Whether what was accumulated is of another seed, first sample or scene than the renderer is set to: until the next start.
+    pub(super) relabelled: AtomicBool,
 }
 
 /// Ray counts since the renderer was made.
@@ -142,8 +145,18 @@ impl Renderer {
         let (settings, first_sample) = (settings.clone(), settings.first_sample);
         let history = None;
         let frame = Frame { scene, film, kernels, allocation, history, constants, first_sample, priority_push };
-        let renderer =
-            Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, stack, soft_lights, fingerprint };
+        let renderer = Self {
+            gpu: gpu.clone(),
+            frame,
+            effects,
+            outputs,
+            settings,
+            paths,
+            stack,
+            soft_lights,
+            fingerprint,
+            relabelled: AtomicBool::new(false),
+        };
         if !renderer.settings.allocate.is_even() {
             renderer.check_offsets("place samples of", ", or --allocate uniform")?;
         }
@@ -194,7 +207,11 @@ impl Renderer {
         if !self.cut().has_room_for(step) {
             return Err(Error::Usage(format!("{step:?} is of another renderer: take those of Renderer::steps")));
         }
-        frame::record(rec, &self.frame, step)
+        frame::record(rec, &self.frame, step)?;
+        if let Step::Start = step {
+            self.relabelled.store(false, Relaxed);
+        }
+        Ok(())
     }
 
     /// Whether only the device knows how many paths [`Renderer::listed`] are listed.
@@ -265,8 +282,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// Chooses another random sequence from the next [`Step::Start`] on; what was accumulated belongs to the old one.
+    /// Chooses another random sequence from the next [`Step::Start`] on, which has to follow; what was accumulated belongs to the old one, and
+    /// its films can be neither resumed nor merged from here on.
     pub fn set_seed(&mut self, seed: u32) {
+        *self.relabelled.get_mut() |= self.settings.seed != seed;
         self.frame.constants.path.seed = seed;
         self.settings.seed = seed;
     }
@@ -281,9 +300,9 @@ impl Renderer {
         &self.frame.scene
     }
 
-    /// That of the scene; none once the camera was moved.
+    /// That of the scene; none once the camera was moved, nor where what was accumulated is of something else.
     pub(super) fn fingerprint(&self) -> Option<&Fingerprint> {
-        self.fingerprint.as_ref()
+        self.fingerprint.as_ref().filter(|_| !self.relabelled.load(Relaxed))
     }
 
     /// What was asked for.

@@ -28,6 +28,8 @@ pub struct Checkpoint {
     pub allocations: u32,
     /// Its samples that were no number.
     pub broken: Option<BrokenSamples>,
+    /// Whether its pixels tell direct and indirect light apart.
+    pub splits_light: bool,
 }
 
 impl Checkpoint {
@@ -66,7 +68,8 @@ impl Checkpoint {
             }
             pending => pending.unwrap_or_else(|| vec![0; pixels.len()]),
         };
-        Ok(Self { pixels, priority, pending, allocations: allocations(film)?, broken })
+        let splits_light = film::splits_light(film)?;
+        Ok(Self { pixels, priority, pending, allocations: allocations(film)?, broken, splits_light })
     }
 
     /// Where in the schedule it stopped.
@@ -81,8 +84,8 @@ impl Renderer {
     /// with [`Renderer::resumable`].
     ///
     /// # Errors
-    /// [`Error::Usage`] when the renderer cannot go on, or when the checkpoint is of a film of another size;
-    /// [`Error::Device`].
+    /// [`Error::Usage`] when the renderer cannot go on, or when the checkpoint is of a film of another size, or without the split light
+    /// that this renderer keeps; [`Error::Device`].
     pub fn resume(&self, frame: &mut FrameResources, checkpoint: &Checkpoint) -> Result<()> {
         let allocation = self.frame.allocation()?;
         let Checkpoint { pixels, priority, pending, .. } = checkpoint;
@@ -98,6 +101,7 @@ impl Renderer {
         if !priority.is_empty() {
             of_film("priorities", priority.len())?;
         }
+        self.check_split(checkpoint.splits_light)?;
         self.run(frame, &Step::Start)?;
         self.write_pixels(pixels)?;
         let counts = &self.frame.film.counts;
@@ -105,6 +109,16 @@ impl Renderer {
         counts.count.write(0, pending)?;
         self.gpu.run(frame, |rec| allocation.scan.record(rec, counts))?;
         Ok(())
+    }
+
+    /// Samples without direct and indirect light would count as black ones of both.
+    pub(super) fn check_split(&self, is_split: bool) -> Result<()> {
+        if is_split || !self.effects.split_light {
+            return Ok(());
+        }
+        let what = "these samples do not tell direct and indirect light apart, which this renderer does: render them with \
+                    Outputs::FILTERED, as this one";
+        Err(Error::Usage(what.to_owned()))
     }
 
     /// Puts samples into a film of one tile.

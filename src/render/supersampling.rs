@@ -5,6 +5,7 @@ use crate::gpu::{Buffer, FrameResources, Kernel, Location, PassTime};
 use crate::layout::{Guide, PathPush, vec3, vec4};
 use crate::render::settings::Settings;
 use crate::shaders::guide_lookup::{Bind, Constants};
+use crate::shaders::shared::frame;
 
 /// Eye rays of a dispatch, unless there are more pixels: drivers kill what runs for seconds.
 const RAYS_AT_ONCE: u32 = 1 << 22;
@@ -40,10 +41,9 @@ impl Renderer {
         let filtered = Buffer::from_slice(gpu, "filtered", filtered)?;
         let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;
         let (mut frame, mut times) = (FrameResources::new(gpu)?, Vec::new());
-        times.extend(gpu.run(&mut frame, |rec| {
-            rec.update(&self.frame.scene.camera, &self.frame.constants.camera)?;
-            rec.fill(&indirect, 0)
-        })?);
+        // One of its own: what was accumulated, and what a next frame is compared with, may be of another.
+        let camera = Buffer::from_slice(gpu, "camera", &[self.frame.constants.camera])?;
+        times.extend(gpu.run(&mut frame, |rec| rec.fill(&indirect, 0))?);
         let at_once = (RAYS_AT_ONCE / pixels as u32).clamp(1, RAYS_OF_A_PIXEL);
         for first_sample in (0..eye_rays).step_by(at_once as usize) {
             let samples = at_once.min(eye_rays - first_sample);
@@ -58,7 +58,7 @@ impl Renderer {
             };
             times.extend(gpu.run(&mut frame, |rec| {
                 let s = &self.frame.scene;
-                let (scene, frame, ray_query) = (s.bind(), s.bind_frame(), s.bind_world());
+                let (scene, frame, ray_query) = (s.bind(), frame::Bind { camera: &camera }, s.bind_world());
                 let (guides, filtered, indirect) = (&guide, &filtered, &indirect);
                 let bind = Bind { scene, frame, ray_query, guides, filtered, indirect };
                 rec.dispatch_threads(&kernel, bind, &push, push.pixels)

@@ -16,7 +16,8 @@ impl Renderer {
     /// has changed. That is found by paths traced here and there, two for 16 pixels, of which a change of the camera alone needs none. Of
     /// two updates between frames the second carries nothing: [`Change::add`] makes them one. `scene` is that of [`Renderer::new`] in
     /// another pose. Textures and the picture of the environment stay on the device as they are: edited ones need a new renderer. Other
-    /// arrays that were edited by hand are brought by [`Change::everything`], which has them checked.
+    /// arrays that were edited by hand are brought by [`Change::everything`], which has them checked; but spheres that are traced by ray
+    /// queries need a new renderer.
     ///
     /// What is recorded has to be submitted, in this order: later updates bring only what changed since. After a recording that was thrown
     /// away, update with [`Change::everything`].
@@ -37,6 +38,7 @@ impl Renderer {
             scene.check()?;
         }
         self.check_effects(scene, change)?;
+        *self.relabelled.get_mut() = true;
         let mut constants = frame_constants(scene, &self.settings)?;
         if !change.camera {
             constants.camera = self.frame.constants.camera;

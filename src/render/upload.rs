@@ -28,8 +28,10 @@ pub fn parts<T: Pod>(
         return Ok(());
     }
     if values.len() > to.len() {
-        *to = to.larger(values.len() + spare)?;
-        return rec.upload(to, &[(0, values)]);
+        let larger = to.larger(values.len() + spare)?;
+        rec.upload(&larger, &[(0, values)])?;
+        *to = larger; // only now that its contents are on their way
+        return Ok(());
     }
     let parts = joined(changed, values.len());
     rec.upload(to, &parts.into_iter().map(|range| (range.start, &values[range])).collect::<Vec<_>>())

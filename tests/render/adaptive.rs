@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
-use tallow::image::{self, WriteOptions};
+use tallow::image::{self, Samples, WriteOptions};
 use tallow::render::schedule::{self, Cut};
 use tallow::render::settings::Settings;
 use tallow::render::{Checkpoint, Job, Outputs, Renderer, Status, Step, frame_constants};
@@ -225,7 +225,8 @@ fn records_of_another_film_are_an_error() {
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     let mut resume = |size: usize, priority: usize, lacks: usize| {
         let (pixels, priority, pending) = (vec![Pixel::default(); size], vec![0.0; priority], vec![0; lacks]);
-        renderer.resume(&mut frame, &Checkpoint { pixels, priority, pending, ..Checkpoint::default() })
+        let splits_light = true;
+        renderer.resume(&mut frame, &Checkpoint { pixels, priority, pending, splits_light, ..Checkpoint::default() })
     };
     for wrong in [pixels - 1, pixels + 1, 0] {
         for [size, priority, lacks] in [[wrong, 0, pixels], [pixels, 0, wrong]] {
@@ -240,13 +241,77 @@ fn records_of_another_film_are_an_error() {
     assert_silent(&gpu);
 }
 
+#[test]
+fn samples_without_split_light_go_on_in_no_renderer_that_splits_it() {
+    let gpu = gpu();
+    let scene = scene(|s| s.spp = 2);
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let [whole, split] = [Outputs::default(), split()]
+        .map(|outputs| Renderer::resumable(&gpu, &scene, &scene.settings, outputs).unwrap());
+    // After the beginning and a sample.
+    let checkpoint = interrupted(&Job { paths_at_once: SIZE[0] * SIZE[1], ..Job::new(&whole) }, &mut frame, &scene, 2);
+    whole.resume(&mut frame, &checkpoint).unwrap();
+    let error = split.resume(&mut frame, &checkpoint).unwrap_err();
+    assert!(matches!(&error, Error::Usage(line) if line.contains("direct and indirect light")), "{error}");
+    assert_silent(&gpu);
+}
+
+/// A renderer is used again, or its memory may hold anything.
+#[test]
+fn a_job_that_stops_before_its_first_step_has_no_sample() {
+    let gpu = gpu();
+    let scene = scene(|_| {});
+    let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, split()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    run(&renderer, &mut frame);
+    let job = Job::new(&renderer);
+    let status = job.run(&mut frame, &mut |_| Ok(ControlFlow::Break(()))).unwrap();
+    let film = job.film(&status).unwrap();
+    for (layer, count) in [("samples", 0), ("pending", scene.settings.spp)] {
+        assert_eq!(film.channel(layer), Some(&Samples::U32(vec![count; film.pixels()])), "{layer}");
+    }
+    assert_silent(&gpu);
+}
+
+/// Else samples would count twice in a merge, or go on in a scene that they are not of.
+#[test]
+fn films_tell_what_their_samples_are_of_or_nothing() {
+    let gpu = gpu();
+    let mut scene = scene(|s| s.spp = 1);
+    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let mut run = |renderer: &Renderer| Job::new(renderer).run_to_end(&mut frame).unwrap();
+    let tells = |renderer: &Renderer, status: &Status| {
+        Job::new(renderer).film(status).unwrap().metadata.contains_key("sampleRanges")
+    };
+    let status = run(&renderer);
+    assert!(tells(&renderer, &status));
+    renderer.set_seed(0);
+    assert!(tells(&renderer, &status), "no other seed");
+    renderer.set_seed(1);
+    assert!(!tells(&renderer, &status), "the samples are of seed 0");
+    let status = run(&renderer);
+    assert!(tells(&renderer, &status));
+    renderer.set_first_sample(7);
+    assert!(!tells(&renderer, &status), "the samples begin with the first");
+    let status = run(&renderer);
+    assert!(tells(&renderer, &status));
+    let change = scene.apply(&tallow::scene::Pose::default()).unwrap();
+    gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| renderer.update(rec, &scene, &change)).unwrap();
+    assert!(!tells(&renderer, &status), "the samples may be of another pose");
+    let status = run(&renderer);
+    assert!(tells(&renderer, &status));
+    assert_silent(&gpu);
+}
+
 /// What policies find once per camera is no priority yet: a file that is written before the first round would show it.
 #[test]
 fn a_start_leaves_priorities_as_they_are() {
     let gpu = gpu();
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     let (priority, pending) = (vec![7.0; pixels], vec![0; pixels]);
-    let checkpoint = Checkpoint { pixels: vec![Pixel::default(); pixels], priority, pending, ..Checkpoint::default() };
+    let unsampled = Checkpoint { pixels: vec![Pixel::default(); pixels], splits_light: true, ..Checkpoint::default() };
+    let checkpoint = Checkpoint { priority, pending, ..unsampled };
     for policy in ["geometry", "variance", "both", "threshold"] {
         let scene = scene(|s| s.allocate.policy = tallow::allocate::policy(policy).unwrap());
         let (renderer, mut frame) =

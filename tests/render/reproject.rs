@@ -363,6 +363,28 @@ fn budgets_are_exact_and_fresh_pixels_come_first() {
 }
 
 /// Carried samples count in a pixel's mean, and are no part of the sequence that its new ones come from: those are its first.
+/// Shares of all samples would leave a frame's budget to the few pixels that carry less than theirs.
+#[test]
+fn frames_that_wait_for_nothing_place_their_own_budget_alone() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/scene.toml", |s| {
+        small(s);
+        s.allocate.policy = tallow::allocate::policy("variance").unwrap();
+    });
+    let (spp, mut film) = (scene.settings.spp, Film::new(&gpu, &scene, Reproject::default()));
+    let mut before = vec![0; (49 * 33) as usize];
+    for frame in 0..5 {
+        film.frame(film.camera);
+        let counts: Vec<u32> = film.stats().iter().map(|s| s.count).collect();
+        let new: Vec<u32> = counts.iter().zip(&before).map(|(now, before)| now - before).collect();
+        let (sum, most) = (new.iter().sum::<u32>(), new.iter().max().unwrap());
+        assert_eq!(sum, spp * 49 * 33, "frame {frame}");
+        assert!(*most < 24 * spp, "{most} in one pixel, frame {frame}");
+        before = counts;
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn new_samples_begin_the_sequence_of_their_frame() {
     let gpu = gpu();

@@ -5,10 +5,10 @@ use crate::support::{assert_silent, gpu, hash};
 use crate::twin::Workplace;
 use glam::{Vec2, vec2};
 use std::path::Path;
-use tallow::gpu::{DeviceKind, Gpu};
+use tallow::gpu::{DeviceKind, FrameResources, Gpu};
 use tallow::layout::{Effects, Guide, NONE, vec3, vec4};
 use tallow::render::settings::PixelFilter;
-use tallow::render::{Outputs, Renderer, frame_constants};
+use tallow::render::{Outputs, Renderer, Step, frame_constants};
 use tallow::scene::{Loaded, Scene};
 use tallow::twins::guide_lookup::{GuideRays, look_up};
 use tallow::twins::path::{Strategy, Tracer};
@@ -245,6 +245,23 @@ fn no_guide_ray_spoils_the_image() {
             assert!(image.iter().flatten().all(|v| v.is_finite() && *v >= 0.0), "{light}");
         }
     }
+    assert_silent(&gpu);
+}
+
+/// It looks from where the renderer's camera is now; steps that go on with a film, and a frame that is compared with it, from where it was.
+#[test]
+fn a_lookup_leaves_the_film_its_camera() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/scene.toml", [4, 3], PixelFilter::Box);
+    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+    renderer.run(&mut FrameResources::new(&gpu).unwrap(), &Step::Start).unwrap();
+    let before = renderer.scene().camera.read().unwrap();
+    let mut camera = before[0];
+    camera.position[0] += 0.1;
+    renderer.set_camera(camera).unwrap();
+    let (guide, filtered) = guides(&scene);
+    renderer.look_up(&guide, &filtered, 1).unwrap();
+    assert_eq!(renderer.scene().camera.read().unwrap(), before);
     assert_silent(&gpu);
 }
 
