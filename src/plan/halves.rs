@@ -79,8 +79,7 @@ mod tests {
         assert!(of_filtered.iter().flatten().all(|scale| (scale - (0.64 + RELMSE_EPSILON)).abs() < 1e-6));
         // By hand: (1.69 + .09) / 2 - 0 - .3 * 2 + 0 and the same of the other pixel.
         let found = error_of_filtered([&fa, &fb], [&a, &b], &scales);
-        // Noise is .5 of that: the unbiased estimate is less by chance.
-        assert!((0.89 - 0.6) < 0.5);
+        // Which is (.89 - .6) / 1.01, and by chance less than the variance, .5 / 1.01.
         assert!((found - 0.5 / 1.01).abs() < 1e-6, "{found}");
         let (fa, fb) = (image(&[0.9, 0.7]), image(&[0.7, 0.9]));
         // (.81 + .49) / 2 - 0 - .7 * 2 and the same of the other pixel, which is less than nothing, against .02.
