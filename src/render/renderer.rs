@@ -282,8 +282,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Chooses another random sequence from the next [`Step::Start`] on, which has to follow; what was accumulated belongs to the old one, and
-    /// its films can be neither resumed nor merged from here on.
+    /// Chooses another random sequence from the next [`Step::Start`] on, which has to follow; what was accumulated belongs to the old
+    /// one, and its films can be neither resumed nor merged from here on.
     pub fn set_seed(&mut self, seed: u32) {
         *self.relabelled.get_mut() |= self.settings.seed != seed;
         self.frame.constants.path.seed = seed;

@@ -62,8 +62,8 @@ pub fn save(
     written
 }
 
-/// Writes the one image from before a filter runs, which is that of [`before_filter`] if there is one. Where it lacks layers, a checkpoint holds what the filter
-/// and further samples need, until all is written.
+/// Writes the one image from before a filter runs, that of [`before_filter`] if there is one. Where it lacks layers, a checkpoint holds
+/// what the filter and further samples need, until all is written.
 pub fn save_noisy(
     item: &[Item],
     film: &Film,

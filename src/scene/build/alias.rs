@@ -97,13 +97,13 @@ mod tests {
     #[test]
     fn dim_texels_of_a_large_sky_are_drawn_as_seldom_as_claimed() {
         const TEXELS: usize = 1 << 20;
-        const STEPS: u32 = 1 << 14;
+        const SMALL: u32 = 1 << 14;
         let mut weights = vec![1.0; TEXELS];
-        weights[77] = TEXELS as f64 * f64::from(STEPS);
+        weights[77] = TEXELS as f64 * f64::from(SMALL);
         let table = build(&weights);
         let count = 1 << 22;
         let expected = (1.0 - probabilities(&table)[77]) * f64::from(count);
-        assert!((expected - f64::from(count / STEPS)).abs() < 1.0, "{expected}");
+        assert!((expected - f64::from(count / SMALL)).abs() < 1.0, "{expected}");
         let dim = (0..count).filter(|&i| alias_choose(&table, pcg(i)).0 != 77).count() as f64;
         assert!((dim - expected).abs() < 5.0 * expected.sqrt(), "{dim} of {count}, expected {expected}");
     }
