@@ -146,14 +146,14 @@ fn light_that_has_changed_leaves_no_ghost() {
     assert_silent(&gpu);
 }
 
-/// A veil that stops half of what is seen through it, before a sign that shines on nothing but its back.
+/// A veil that stops half of what is seen through it, before a black ball on a bright sky: nothing lights up or goes dark where paths begin.
 fn veil() -> Loaded {
     let mut scene = Workplace::new().scene(
-        "[camera]\nposition = [0.0, 0.0, 6.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n[environment]\nradiance = 0.05\n\
-         [[material]]\nname = 'glow'\ncolor = 0.0\nemission = 4.0\n[[material]]\nname = 'veil'\nopacity = 0.5\n\
+        "[camera]\nposition = [0.0, 0.0, 6.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n[environment]\nradiance = 1.0\n\
+         [[material]]\nname = 'black'\ncolor = 0.0\n[[material]]\nname = 'veil'\nopacity = 0.5\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'veil'\ntransform = { scale = 6.0, translate = [0.0, 0.0, 3.0] }\n\
-         [[mesh]]\nname = 'sign'\nshape = 'sphere'\nsegments = 24\nmaterial = 'glow'\n\
-         [[instance]]\nname = 'sign'\nmesh = 'sign'\ntransform = { scale = 0.25, translate = [1.2, 0.6, 0.3] }\n",
+         [[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 24\nmaterial = 'black'\ntransform = { scale = 6.0 }\n\
+         [[instance]]\nname = 'sign'\nmesh = 'ball'\ntransform = { scale = 0.25, translate = [1.2, 0.6, 0.3] }\n",
     );
     let s = &mut scene.settings;
     (s.width, s.height, s.spp, s.max_depth) = (49, 33, 16, 4);
