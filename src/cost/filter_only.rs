@@ -12,7 +12,6 @@ use crate::denoise::{Recipe, file, timed};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::image::aov::{Aovs, Names};
-use crate::image::primaries::to_rec709;
 use crate::image::{Film, Picture, Samples};
 use crate::scene::Fingerprint;
 use std::path::Path;
@@ -157,8 +156,7 @@ impl Filters<'_> {
         };
         let warm_up = add_filter(&mut run, &WarmUp { compile_ms: 0.0, first_run_ms: 0.0 }, &filtered);
         let size = [self.plan.film.width, self.plan.film.height];
-        let mut picture = Picture::of_planes(size, &filtered.colour);
-        self.plan.film.primaries.iter().for_each(|own| to_rec709(own, &mut picture.pixels));
+        let picture = self.plan.film.as_rec709(Picture::of_planes(size, &filtered.colour));
         let picture = picture.finite().map_err(Error::Device)?;
         Ok(Measured { point, run, picture, warm_up, device_bytes: filtered.device_bytes })
     }

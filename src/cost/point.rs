@@ -82,7 +82,7 @@ pub struct Run {
 /// Time of one pass within a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pass {
-    /// As [`PassTime::name`](crate::gpu::PassTime::name).
+    /// The kernel's name, or what was done without one: see [`PassTime::name`](crate::gpu::PassTime::name).
     pub pass: String,
     /// Number of times that it ran.
     pub calls: usize,

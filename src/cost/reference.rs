@@ -4,9 +4,8 @@ use super::judge::Noise;
 use crate::error::{Error, Result};
 use crate::image::aov::{Aovs, Names};
 use crate::image::metrics;
-use crate::image::primaries::is_rec709;
 use crate::image::{self, Film, Picture};
-use crate::render::provenance::Provenance;
+use crate::render::provenance::{self, Provenance};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use std::path::Path;
@@ -62,7 +61,7 @@ pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings)>) -> 
 
 /// Upper bound of a file's noise, from its layer of variances, which is not known in other primaries than the file's.
 fn bound(film: &Film, picture: &Picture) -> Option<Noise> {
-    if film.primaries.is_some_and(|own| !is_rec709(&own)) {
+    if film.foreign_primaries().is_some() {
         return None;
     }
     let aovs = Aovs::find(film, &Names::new()).ok()?;
@@ -79,9 +78,7 @@ pub fn noise_of(picture: &Picture, variance: &[[f32; 3]]) -> Noise {
 
 /// Settings that change the expected image and that a file was rendered with other values of.
 fn differences(of_file: &serde_json::Value, settings: &Settings) -> Vec<String> {
-    // By way of text: a number's shortest decimal is not its value in double precision.
-    let text = serde_json::to_string(settings).unwrap_or_default();
-    let ours: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    let ours = provenance::values(settings).unwrap_or_default();
     let differs = |key: &&str| of_file.get(*key).is_some_and(|value| ours.get(*key) != Some(value));
     let note = |key: &str| {
         let (theirs, ours) = (&of_file[key], &ours[key]);

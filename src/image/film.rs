@@ -201,9 +201,18 @@ impl Film {
     /// # Errors
     /// As [`Film::picture`].
     pub fn rec709(&self, layer: Option<&str>) -> Result<Picture, String> {
-        let mut picture = self.picture(layer)?;
-        self.primaries.iter().for_each(|own| primaries::to_rec709(own, &mut picture.pixels));
-        Ok(picture)
+        self.picture(layer).map(|picture| self.as_rec709(picture))
+    }
+
+    /// The same of a picture in the film's primaries.
+    pub(crate) fn as_rec709(&self, mut picture: Picture) -> Picture {
+        self.foreign_primaries().iter().for_each(|own| primaries::to_rec709(own, &mut picture.pixels));
+        picture
+    }
+
+    /// Its primaries, where they are others than those of Rec. 709.
+    pub(crate) fn foreign_primaries(&self) -> Option<Primaries> {
+        self.primaries.filter(|own| !primaries::is_rec709(own))
     }
 
     /// The channels that [`Film::picture`] takes, the same one three times for grey.

@@ -12,10 +12,10 @@ pub(crate) const REC709: Primaries = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0
 /// Chromaticities closer than this are the same: files round them.
 const ALIKE: f32 = 2e-3;
 
-/// Brings colours of these primaries to Rec. 709, if they are others. White becomes white. What Rec. 709 cannot show is
+/// Brings colours of these primaries to Rec. 709. White becomes white. What Rec. 709 cannot show is
 /// cut at 0.
 pub fn to_rec709(primaries: &Primaries, colours: &mut [[f32; 3]]) {
-    let Some(matrix) = matrix(primaries).filter(|_| !is_rec709(primaries)) else { return };
+    let Some(matrix) = matrix(primaries) else { return };
     for colour in colours {
         let rgb = DVec3::from(colour.map(f64::from));
         // A comparison with NaN is false, which stays what it was.

@@ -1,7 +1,7 @@
 //! An image file in memory of which some channels are replaced and all others are kept.
 use super::film::{Channel, Film, Picture};
 use super::frame::{self, Frame};
-use super::{Claim, exr, primaries};
+use super::{Claim, exr};
 use crate::error::{Checked, Error, Result};
 use ::exr::image::FlatImage;
 use ::exr::meta::attribute::IntegerBounds;
@@ -85,9 +85,7 @@ impl Source {
         let channels = self.film.find(layer).ok_or_else(|| input(self.film.no_such_layer(layer)))?;
         let frames = self.frames().map_err(input)?;
         let [r, g, b] = channels.map(|channel| shown_samples(channel, replaced, frames).map_err(input));
-        let mut picture = Picture::of_planes(claim.size, &[r?, g?, b?]);
-        self.film.primaries.iter().for_each(|own| primaries::to_rec709(own, &mut picture.pixels));
-        Ok(picture)
+        Ok(self.film.as_rec709(Picture::of_planes(claim.size, &[r?, g?, b?])))
     }
 
     /// Encodes an EXR file of everything, with new samples and another entry of metadata. The old samples are kept in the layer

@@ -89,8 +89,8 @@ impl Renderer {
         Ok((times, schedule::frame(settings, &self.cut(), begun).collect()))
     }
 
-    /// Chooses the index of each pixel's first sample in its sequence, from the next [`Step::Start`] or [`Step::Reproject`] on: one has to
-    /// follow.
+    /// Chooses the index of each pixel's first sample in its sequence, from the next [`Step::Start`] or [`Step::Reproject`] on. One of
+    /// them has to follow before more samples are taken.
     pub fn set_first_sample(&mut self, first_sample: u32) {
         *self.relabelled.get_mut() |= self.settings.first_sample != first_sample;
         self.frame.first_sample = first_sample;

@@ -112,6 +112,14 @@ fn parsed<T: DeserializeOwned>(film: &Film, key: &str) -> std::result::Result<T,
     serde_json::from_str(said(film, key)?).map_err(|e| format!("{key}: {e}"))
 }
 
+/// Settings as a file tells them, by way of its text: a number's shortest decimal is not its value in double precision.
+///
+/// # Errors
+/// [`Error::Usage`] when JSON cannot say them (a bug).
+pub(crate) fn values(settings: &Settings) -> Result<serde_json::Value> {
+    serde_json::from_str(&json(settings)?).map_err(|e| Error::Usage(e.to_string()))
+}
+
 fn json(what: &impl Serialize) -> Result<String> {
     serde_json::to_string(what).map_err(|e| Error::Usage(e.to_string()))
 }

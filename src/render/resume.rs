@@ -9,7 +9,6 @@ use crate::render::schedule;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::statistics::{BrokenSamples, Pixel, next_sample};
-use serde_json::Value;
 use std::path::Path;
 
 /// Metadata that tells how many allocations a render had made.
@@ -157,9 +156,7 @@ pub fn is_frame(film: &Film, scene: &Scene, settings: &Settings, history: &str) 
 /// Whether a render of this scene can go on where the file's ended.
 fn check(rendered: &Rendered, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
     let (Rendered { provenance, settings: former, .. }, uniform) = (rendered, settings.allocate.is_even());
-    // By way of text: a number's shortest decimal is not its value in double precision.
-    let text = serde_json::to_string(settings).map_err(|e| e.to_string())?;
-    let mut wanted: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
+    let mut wanted = provenance::values(settings).map_err(|e| e.to_string())?;
     let mut had = provenance.settings.clone();
     if uniform {
         for settings in [&mut wanted, &mut had] {

@@ -1,6 +1,7 @@
 //! Tests `tallow cost` on a small film: what is in its files, that a point can be rendered again to the same bits, and what it
 //! does when it is interrupted or when points fail.
 #![cfg(target_os = "linux")]
+use crate::REC2020;
 use crate::child::{Running, command, scene};
 use crate::command::complains;
 use etcetera::BaseStrategy;
@@ -281,7 +282,7 @@ fn filters_are_measured_on_a_given_image() {
     assert!((relmse(&picture("point.exr"), &picture("clean.exr")) / error(2) - 1.0).abs() < 1e-9);
     // Beside itself an image in other primaries has no error.
     let mut wide = image::read(&folder.path().join("noisy.exr")).unwrap();
-    wide.primaries = Some([[0.708, 0.292], [0.17, 0.797], [0.131, 0.046], [0.3127, 0.329]]); // Rec. 2020
+    wide.primaries = Some(REC2020);
     image::write(&folder.path().join("wide.exr"), &wide, &image::WriteOptions::default()).unwrap();
     let words = "cost --filter-only wide.exr --reference wide.exr --denoise none --repeats 2 -o wide";
     text(&within(&folder, words).output().unwrap(), 0);

@@ -21,3 +21,6 @@ mod sequence;
 mod signals;
 mod statistical;
 mod stride;
+
+/// Primaries that are not those of Rec. 709: of Rec. 2020.
+const REC2020: [[f32; 2]; 4] = [[0.708, 0.292], [0.17, 0.797], [0.131, 0.046], [0.3127, 0.329]];

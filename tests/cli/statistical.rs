@@ -1,4 +1,5 @@
 //! Tests `tallow compare --statistical`: verdicts, exit codes and files.
+use crate::REC2020;
 use crate::command::{complains, stdout, tallow};
 use serde_json::Value;
 use std::path::Path;
@@ -119,7 +120,7 @@ fn what_cannot_be_tested_is_one_line() {
     once.add("samples", Samples::U32(vec![1; 1024]));
     save(&once, "once.exr");
     let mut wide = image::read(&folder.path().join("b.exr")).unwrap();
-    wide.primaries = Some([[0.708, 0.292], [0.17, 0.797], [0.131, 0.046], [0.3127, 0.329]]); // Rec. 2020
+    wide.primaries = Some(REC2020);
     save(&wide, "wide.exr");
     complains(&compare(&folder, "a.exr wide.exr"), 3, &["wide.exr", "other primaries"]);
     assert_eq!(compare(&folder, "wide.exr wide.exr").status.code(), Some(0));

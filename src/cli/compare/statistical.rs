@@ -4,7 +4,6 @@ use super::{check_sizes, evidence, junit, page, words};
 use crate::cli::files::check_distinct;
 use crate::cli::{Exit, check_png, complain, print, print_json, readable, within};
 use crate::error::{Error, Result};
-use crate::image::primaries::is_rec709;
 use crate::image::significance::{self, Options, Scale, Verdict};
 use crate::image::{self, output};
 use serde_json::{Value, json};
@@ -59,7 +58,7 @@ pub struct Args {
 pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
     check_outputs(a, b, args)?;
     let sides = [Side::read(a, None)?, Side::read(b, args.errors.as_deref())?];
-    let [of_a, of_b] = sides.each_ref().map(|side| side.film.primaries.filter(|own| !is_rec709(own)));
+    let [of_a, of_b] = sides.each_ref().map(|side| side.film.foreign_primaries());
     if of_a != of_b {
         let what =
             "has other primaries than the first image, and variances cannot be converted: render both in the same";

@@ -31,7 +31,7 @@ impl Materials {
         m.flags |= MATERIAL_GGX;
         m.base_texture = self.texture(&mut s, &table.color_texture, Kind::Color)?;
         m.emission_texture = self.texture(&mut s, &table.emission_texture, Kind::Light)?;
-        self.opacity(&mut m, &mut s)?;
+        let fades = self.opacity(&mut m, &mut s)?;
         m.normal_scale = table.normal_scale.unwrap_or(1.0);
         self.layers(&mut m, &mut s)?;
         if !(m.normal_scale.is_finite() && m.clearcoat_normal_scale.is_finite()) {
@@ -52,7 +52,7 @@ impl Materials {
             make_unlit(&mut m);
         }
         let index = self.push(&table.name, m);
-        if takes_alpha(table) {
+        if fades {
             self.take_vertex_alpha.push(index);
         }
         Ok(index)
@@ -97,13 +97,14 @@ impl Materials {
         Ok(())
     }
 
-    fn opacity(&mut self, m: &mut Material, s: &mut Source) -> Result<(), String> {
+    /// Returns whether alpha makes holes, that of vertices too: not below a cutoff of 0.
+    fn opacity(&mut self, m: &mut Material, s: &mut Source) -> Result<bool, String> {
         let t = s.table;
         let alpha = within(t.opacity.unwrap_or(1.0), 1.0, "opacity")?;
         let cutoff = within(t.alpha_cutoff.unwrap_or(0.5), 1e6, "alpha_cutoff")?;
         match t.alpha_mode {
             Some(AlphaMode::Mask) if cutoff > 0.0 => m.alpha_cutoff = cutoff,
-            Some(AlphaMode::Opaque | AlphaMode::Mask) => return Ok(()),
+            Some(AlphaMode::Opaque | AlphaMode::Mask) => return Ok(false),
             _ => {}
         }
         m.opacity = alpha;
@@ -112,15 +113,7 @@ impl Materials {
             (None, Some(_)) => self.texture(s, &t.color_texture, Kind::Alpha)?,
             (None, None) => NONE,
         };
-        Ok(())
-    }
-}
-
-/// Whether alpha makes holes: that of a mask does whose cutoff is above 0.
-fn takes_alpha(t: &MaterialTable) -> bool {
-    match t.alpha_mode {
-        Some(AlphaMode::Mask) => t.alpha_cutoff.is_none_or(|cutoff| cutoff > 0.0),
-        mode => mode == Some(AlphaMode::Blend),
+        Ok(t.alpha_mode.is_some())
     }
 }
 
