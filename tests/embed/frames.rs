@@ -2,6 +2,7 @@
 //! command line writes.
 #![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
 use crate::support::engine::Engine;
+use crate::support::largest;
 use ash::vk;
 use ash::vk::Handle;
 use bytemuck::Pod;
@@ -221,9 +222,10 @@ fn an_engine_filters_its_frames_where_they_are() {
         assert!(frame.times().unwrap().iter().any(|pass| pass.name == "demodulate"), "the filter's passes are timed");
         let parts = twin::split(&aovs, demodulation);
         let expected = parts.remodulate(&filter::run(&gpu, row, &parts.input, &settings).unwrap().0);
-        let off = download.read().unwrap().iter().zip(&expected).fold(0f32, |worst, (found, expected)| {
-            (0..3).fold(worst, |worst, c| worst.max((found[c] - expected[c]).abs() / expected[c].abs().max(1e-2)))
-        });
+        let off = |(found, expected): (&vec4, &vec3)| {
+            largest((0..3).map(|c| (found[c] - expected[c]).abs() / expected[c].abs().max(1e-2)))
+        };
+        let off = largest(download.read().unwrap().iter().zip(&expected).map(off));
         assert!(off < 1e-3, "{name}: {off}");
         let plain = film.picture(None).unwrap().pixels;
         let moved = expected.iter().zip(&plain).filter(|(a, b)| (a[0] - b[0]).abs() > 1e-2 * b[0].abs()).count();

@@ -63,6 +63,11 @@ fn open(tuning: Option<Tuning>) -> Gpu {
         .unwrap_or_else(|e| panic!("this test needs a Vulkan device and the validation layers: {e}"))
 }
 
+/// The largest of them, at least 0; infinite where one is no number, which `f32::max` would pass over.
+pub fn largest(values: impl IntoIterator<Item = f32>) -> f32 {
+    values.into_iter().fold(0.0, |most, v| if v.is_nan() { f32::INFINITY } else { most.max(v) })
+}
+
 /// # Panics
 /// When the validation layers have said anything.
 pub fn assert_silent(gpu: &Gpu) {

@@ -1,6 +1,6 @@
 //! Images for the filters' tests: a floor and a wall with a step in depth, lit from one side.
 #![allow(dead_code)]
-use crate::support::hash;
+use crate::support::{hash, largest};
 use tallow::denoise::filter::{AtrousForm, FilterInput, FilterSettings, WaveletBasis};
 use tallow::layout::{Guide, NONE, vec4};
 
@@ -129,12 +129,9 @@ pub fn settings(filter: &str) -> Vec<FilterSettings> {
 /// The largest difference of a channel, relative to the pixel's largest where that is above `scale`.
 pub fn apart(a: &[vec4], b: &[vec4], scale: f32) -> f32 {
     assert_eq!(a.len(), b.len());
-    let largest = |c: &vec4| c[..3].iter().fold(scale, |m, v| m.max(v.abs()));
-    let pair = |(a, b): (&vec4, &vec4)| {
-        let off = (0..4).map(|i| (a[i] - b[i]).abs()).fold(0.0, f32::max);
-        if off.is_nan() { f32::INFINITY } else { off / largest(b) }
-    };
-    a.iter().zip(b).map(pair).fold(0.0, f32::max)
+    let unit = |c: &vec4| c[..3].iter().fold(scale, |m, v| m.max(v.abs()));
+    let pair = |(a, b): (&vec4, &vec4)| largest((0..4).map(|i| (a[i] - b[i]).abs())) / unit(b);
+    largest(a.iter().zip(b).map(pair))
 }
 
 /// One row of pixels on one plane, without edges.

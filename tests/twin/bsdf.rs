@@ -111,7 +111,7 @@ fn on_device(gpu: &Gpu, effects: &Effects, cases: &[Case]) -> Result<Vec<[Vec4; 
 /// Agreement of one case: 0.2 %, but for values that rounding at a lobe's flank moves; `sampled` decides whether a
 /// sample holds anything.
 fn agrees(device: &[Vec4; 5], host: &[Vec4; 5]) -> bool {
-    let close = |a: Vec4, b: Vec4| (a - b).abs().max_element() <= 2e-3 * b.abs().max_element() + 1e-5;
+    let close = |a: Vec4, b: Vec4| (a - b).abs().cmple(Vec4::splat(2e-3 * b.abs().max_element() + 1e-5)).all();
     let absorbed = device[1].w == 0.0 && host[1].w == 0.0;
     close(device[0], host[0])
         && close(device[3], host[3])

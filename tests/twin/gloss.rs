@@ -1,5 +1,5 @@
 //! What `auto` makes of two lamps' reflections on a rough plate: bright and noisy, on dark without noise, and no guide shows them.
-use crate::support::{assert_silent, gpu, hash};
+use crate::support::{assert_silent, gpu, hash, largest};
 use tallow::denoise::filter::{FilterInput, FilterSettings, find, run};
 use tallow::layout::{Guide, vec4};
 
@@ -72,7 +72,7 @@ fn auto_is_not_worse_than_noise_between_reflections() {
         let errors = [&output, &twin, &input.radiance].map(|image| relmse(image));
         println!("{spp} samples: kernel, twin, noisy {errors:.4?}");
         assert!(errors[0] < errors[2] && errors[1] < errors[2], "{spp} samples: {errors:?}");
-        let apart = output.iter().zip(&twin).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
+        let apart = largest(output.iter().zip(&twin).map(|(a, b)| (a[0] - b[0]).abs()));
         assert!(apart < 1e-3 * BRIGHT, "{apart}");
     }
     assert_silent(&gpu);

@@ -1,7 +1,7 @@
 //! Tests the lookup of filtered light along eye rays: the choice among four guide rays by hand, the kernel against its twin, and
 //! guide rays with invalid values.
 use crate::kernels::pictures;
-use crate::support::{assert_silent, gpu, hash};
+use crate::support::{assert_silent, gpu, hash, largest};
 use crate::twin::Workplace;
 use glam::{Vec2, vec2};
 use std::path::Path;
@@ -116,8 +116,7 @@ fn tens_of_thousands_of_eye_rays_bring_what_a_few_do() {
     let (guide, filtered) = guides(&scene);
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let [few, many] = [4096, 1 << 16].map(|n| renderer.look_up(&guide, &filtered, n).unwrap().0);
-    let apart =
-        |a: &[vec3], b: &[vec3]| a.iter().zip(b).map(|(a, b)| (a[1] - b[1]).abs() / b[1].max(0.01)).fold(0.0, f32::max);
+    let apart = |a: &[vec3], b: &[vec3]| largest(a.iter().zip(b).map(|(a, b)| (a[1] - b[1]).abs() / b[1].max(0.01)));
     assert!(apart(&few, &many) < 0.03, "{few:?} {many:?}");
     let mut turned = many.clone();
     turned.rotate_right(1);

@@ -1,5 +1,5 @@
 //! Tests what smooth surfaces show, by the kernel and by its twin, in scenes where the answer is known.
-use crate::support::{assert_silent, gpu};
+use crate::support::{assert_silent, gpu, largest};
 use crate::twin::Workplace;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ fn shows(scene: &Loaded, seen: &[Vec<Guide>; 2], name: &str, axis: Vec3, at: f32
         }
     }
     let apart = |(a, b): (&Guide, &Guide)| Vec3::from(a.albedo).distance(b.albedo.into());
-    let most = seen[0].iter().zip(&seen[1]).map(apart).fold(0.0, f32::max);
+    let most = largest(seen[0].iter().zip(&seen[1]).map(apart));
     assert!(most < 1e-3, "{name}: albedos of kernel and twin are {most} apart");
 }
 

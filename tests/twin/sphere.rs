@@ -1,4 +1,5 @@
 //! Compares the CPU twins of exact spheres with 64-bit arithmetic, fine meshes and closed forms.
+use crate::support::largest;
 use crate::twin::*;
 use glam::{DVec3, Vec3, vec3};
 use tallow::layout::{LIGHT_SPHERE, LIGHT_TRIANGLE, NONE, SPHERE};
@@ -107,7 +108,7 @@ fn apart(exact: &Loaded, mesh: &Loaded) -> [f32; 4] {
         assert!(a.geometric.dot(direction).signum() == b.geometric.dot(direction).signum(), "{a:?} {b:?}");
         let off = [a.position.distance(b.position), a.smooth_normal.distance(b.smooth_normal)];
         let all = [off[0], off[1], a.normal.distance(b.normal), a.uv.distance(b.uv)];
-        (0..4).for_each(|k| worst[k] = worst[k].max(all[k]));
+        (0..4).for_each(|k| worst[k] = largest([worst[k], all[k]]));
     }
     assert!(met > 500, "{met} met");
     worst

@@ -1,7 +1,7 @@
 //! Checks what every filter must keep to whatever its input: constant images come back, invalid pixels reach no others, and no NaN
 //! comes out. Every check runs over every row of the table of filters, on the device and on its twin.
 use crate::picture;
-use crate::support::{assert_silent, gpu, hash};
+use crate::support::{assert_silent, gpu, hash, largest};
 use tallow::denoise::filter::{AtrousForm, FILTERS, FilterInput, FilterSettings, Row, find, run};
 use tallow::gpu::Gpu;
 use tallow::layout::{Guide, vec4};
@@ -214,7 +214,7 @@ fn edges_of_the_geometry_hold() {
         });
         let narrow = narrow.scaled_to(&input);
         for output in [run(&gpu, row, &input, &narrow).unwrap().0, (row.reference)(&input, &narrow)] {
-            let worst = output.iter().zip(&input.radiance).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
+            let worst = largest(output.iter().zip(&input.radiance).map(|(a, b)| (a[0] - b[0]).abs()));
             assert!(worst < 0.25, "{}: {worst} crossed the edge", row.name);
         }
     }
@@ -240,7 +240,7 @@ fn sub_sampled_images_are_in_painted() {
                 .scaled_to(&input);
             for output in [run(&gpu, row, &input, &narrow).unwrap().0, (row.reference)(&input, &narrow)] {
                 let off = |(i, c): (usize, &vec4)| (c[0] - if i % 64 < 30 { 0.0 } else { 4.0 }).abs();
-                let worst = output.iter().enumerate().map(off).fold(0.0, f32::max);
+                let worst = largest(output.iter().enumerate().map(off));
                 let most = match row.name {
                     "guided" => 4.0 * 3.0 / 49.0,
                     "auto" => 4.0 * 3.0 / 9.0,
@@ -360,7 +360,7 @@ fn auto_makes_no_negative_light() {
     let auto = find("auto").unwrap();
     let (output, reference) = (run(&gpu, auto, &input, &settings).unwrap().0, (auto.reference)(&input, &settings));
     assert!(output.iter().chain(&reference).all(|c| c[0] >= 0.0), "{:?}", output[beyond]);
-    let apart = output.iter().zip(&reference).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
+    let apart = largest(output.iter().zip(&reference).map(|(a, b)| (a[0] - b[0]).abs()));
     assert!(apart < 1e-4, "{apart}");
     assert_silent(&gpu);
 }
