@@ -3,7 +3,7 @@ use super::{Section, push};
 use tallow::denoise::filter::{self, FilterInput, FilterSettings, Planes, Row};
 use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::layout::Guide;
-use tallow::profile::median;
+use tallow::profile::{median, wake};
 use tallow::report::html::Table;
 
 const RUNS: usize = 3;
@@ -92,6 +92,7 @@ pub fn median_ms(gpu: &Gpu, row: &Row, settings: &FilterSettings, input: &Filter
     let filter = row.compile(gpu, settings, planes.size)?;
     let mut frame = FrameResources::new(gpu)?;
     let mut times = Vec::new();
+    wake(gpu)?;
     for _ in 0..=RUNS {
         let passes = gpu.run(&mut frame, |rec| filter.record(rec, &planes))?;
         times.push(total_ms(&passes));

@@ -5,6 +5,7 @@ use anyhow::anyhow;
 use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::image::Picture;
 use tallow::layout::{Guide, PixelStats, vec3, vec4};
+use tallow::profile::wake;
 use tallow::render::settings::{Settings, Split};
 use tallow::render::{Job, Outputs, Renderer, Step, traces_paths};
 use tallow::scene::{Loaded, Scene};
@@ -62,6 +63,7 @@ pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
     for kind in ONE_OF_EACH {
         renderer.steps().find(kind).map_or(Ok(Vec::new()), |step| renderer.run(&mut frame, &step))?;
     }
+    wake(gpu)?;
     let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
     let took = |counts: fn(&str) -> bool| total_ms(times.iter().filter(|pass| counts(pass.name)));
     let (ms, path_ms) = (took(|name| name != "primary_hit"), took(|name| traces_paths(name) || name == "accumulate"));

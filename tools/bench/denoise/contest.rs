@@ -8,7 +8,7 @@ use tallow::denoise::filter::{FilterSettings, Method, OidnQuality, Scales};
 use tallow::denoise::{Clean, ExpectedError, Filtered, Noisy, Recipe};
 use tallow::gpu::{FrameResources, Gpu, total_ms};
 use tallow::image::{Picture, metrics};
-use tallow::profile::median;
+use tallow::profile::{median, wake};
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
@@ -109,7 +109,9 @@ impl Contender {
         let settings =
             |scales: &Scales| FilterSettings::default().scaled_by(scales).with(|s| s.oidn.oidn_quality = quality);
         let recipe = Recipe { settings: &settings, ..Recipe::new(self.method) };
-        Ok(Filtered::new(gpu, noisy, &recipe)?.join(gpu)?)
+        let filtered = Filtered::new(gpu, noisy, &recipe)?;
+        wake(gpu)?; // it slept while kernels were made
+        Ok(filtered.join(gpu)?)
     }
 }
 
