@@ -31,13 +31,13 @@ void main() {
     if (c.count > 0u) {
         History h = History_load(history, from);
         s.mean = h.mean;
-        s.m2 = still ? h.variance : h.variance * freedom(c.count);
+        s.m2 = still ? h.variance : h.variance * float(c.count - 1u); // of one sample there are no deviations
         s.count = c.count;
         if (FX_SPLIT) {
             HistoryLight taken = HistoryLight_load(history_light, from);
             l.direct = taken.direct;
             l.albedo = taken.albedo;
-            l.indirect_m2 = still ? taken.indirect_variance : taken.indirect_variance * freedom(c.count);
+            l.indirect_m2 = still ? taken.indirect_variance : taken.indirect_variance * float(c.count - 1u);
         }
         bool inside = (key >> PIXEL_BITS & FARTHEST) <= FARTHEST / 2u;
         if (c.count >= push.spp && inside) {

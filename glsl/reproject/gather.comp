@@ -64,8 +64,8 @@ void merge(inout Merged m, uint from, Carried c, float weight) {
 uint finish(inout Merged m, bool edge) {
     m.c.count = min(uint(m.samples / m.weight + 0.5), MOST_CARRIED);
     m.c.edge = edge;
-    // Of single samples beside one that nearly all is of, the difference would be rounding.
-    float variance = freedom(m.c.count) / max(m.samples - m.squares / m.samples, 1e-4 * m.samples);
+    // Of single samples beside one that nearly all is of, the difference would be rounding. One sample has no deviations.
+    float variance = float(m.c.count - 1u) / max(m.samples - m.squares / m.samples, 1e-4 * m.samples);
     m.stats.count = m.c.count;
     m.stats.m2 = min(m.stats.m2 * variance, MOST_M2);
     m.light.indirect_m2 = min(m.light.indirect_m2 * variance, MOST_M2);

@@ -109,20 +109,21 @@ uint kept_by_spread(uint pixel, vec3 plane, uint count, bool edge, out float noi
         uint other = uint(q.y * size.x + q.x);
         if (!edge && k >= 9 && !shows_same(pixel, other, plane, width)) continue;
         PixelStats s = PixelStats_load(stats, other);
+        if (s.count == 0u) continue;
         vec3 off = s.mean - origin;
         n += 1.0;
         sum += off;
         squares += dot(off, off);
-        vec3 own = vec3(s.m2.r + s.m2.g + s.m2.b, float(max(s.count, 1u) - 1u), 1.0);
+        vec3 own = vec3(s.m2.r + s.m2.g + s.m2.b, float(s.count - 1u), 1.0);
         within += own.x;
         degrees += own.y;
         if (DEPENDS_ON_VIEW && other != pixel) {
             beside += s.mean;
             others += own;
         }
-        inverse += 1.0 / float(max(s.count, 1u));
+        inverse += 1.0 / float(s.count);
     }
-    float variance = within / max(degrees, 1.0), spread = (squares - dot(sum, sum) / n) / (n - 1.0);
+    float variance = within / max(degrees, 1.0), spread = (squares - dot(sum, sum) / n) / max(n - 1.0, 1.0);
     float beyond = max(spread - SURE_SPREAD * variance * inverse / n - LEAST_SPREAD * dot(origin, origin), 0.0);
     noise = others.y > 0.0 ? others.x / others.y * others.z * others.z / max(dot(beside, beside), 1e-30) : UNKNOWN_NOISE;
     // Single samples do not tell their noise.

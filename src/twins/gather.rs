@@ -1,5 +1,5 @@
 //! Twin of `glsl/reproject/gather.comp`.
-use super::reproject::{Handed, Reprojection, dropped, freedom, surface_of};
+use super::reproject::{Handed, Reprojection, dropped, surface_of};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats, SurfacePoint};
 use crate::math::srgb::luminance;
 use crate::render::Carried;
@@ -52,7 +52,7 @@ impl Merged {
 
     fn finish(mut self, edge: bool) -> Begun {
         let count = ((self.samples / self.weight + 0.5) as u32).min(MOST_CARRIED);
-        let scale = freedom(count) / (self.samples - self.squares / self.samples).max(1e-4 * self.samples);
+        let scale = (count - 1) as f32 / (self.samples - self.squares / self.samples).max(1e-4 * self.samples);
         self.stats.count = count;
         self.stats.m2 = self.stats.m2.map(|m2| (m2 * scale).min(MOST_M2));
         self.light.indirect_m2 = (self.light.indirect_m2 * scale).min(MOST_M2);

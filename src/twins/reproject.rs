@@ -170,14 +170,14 @@ impl Reprojection<'_> {
         let width = pixel_width(&self.previous, self.push.size);
         let same = |q: usize| self.shows_same([&left.guide[pixel], &left.guide[q]], plane, width);
         let near = self.near(pixel).enumerate().filter(|&(k, q)| edge || k < 9 || same(q));
-        let near: Vec<_> = near.map(|(_, q)| &left.stats[q]).collect();
+        let near: Vec<_> = near.map(|(_, q)| &left.stats[q]).filter(|s| s.count > 0).collect();
         let (n, origin) = (near.len() as f32, Vec3::from(left.stats[pixel].mean));
         let offs = near.iter().map(|s| Vec3::from(s.mean) - origin);
         let (sum, squares) = offs.fold((Vec3::ZERO, 0.0), |(sum, squares), off| (sum + off, squares + off.dot(off)));
-        let degrees: f32 = near.iter().map(|s| s.count.saturating_sub(1) as f32).sum();
+        let degrees: f32 = near.iter().map(|s| (s.count - 1) as f32).sum();
         let variance = near.iter().map(|s| s.m2.iter().sum::<f32>()).sum::<f32>() / degrees.max(1.0);
-        let inverse: f32 = near.iter().map(|s| 1.0 / s.count.max(1) as f32).sum();
-        let spread = (squares - sum.dot(sum) / n) / (n - 1.0);
+        let inverse: f32 = near.iter().map(|s| 1.0 / s.count as f32).sum();
+        let spread = (squares - sum.dot(sum) / n) / (n - 1.0).max(1.0);
         let share = if edge { SHARE_AT_EDGE } else { SHARE_OF_SPREAD };
         let beyond = (spread - SURE_SPREAD * variance * inverse / n - LEAST_SPREAD * origin.dot(origin)).max(0.0);
         if degrees > 0.0 { worth(count, share * beyond / (variance - beyond).max(1e-30)) } else { count }
@@ -189,10 +189,10 @@ impl Reprojection<'_> {
         let same = |q: usize| self.shows_same([&left.guide[pixel], &left.guide[q]], plane, width);
         let near = self.near(pixel).enumerate().filter(|&(k, q)| q != pixel && (edge || k < 9 || same(q)));
         let (mut mean, mut within, mut degrees, mut n) = (Vec3::ZERO, 0.0, 0.0, 0.0);
-        for s in near.map(|(_, q)| &left.stats[q]) {
+        for s in near.map(|(_, q)| &left.stats[q]).filter(|s| s.count > 0) {
             mean += Vec3::from(s.mean);
             within += s.m2.iter().sum::<f32>();
-            degrees += s.count.saturating_sub(1) as f32;
+            degrees += (s.count - 1) as f32;
             n += 1.0;
         }
         if degrees > 0.0 { within / degrees * n * n / mean.length_squared().max(1e-30) } else { UNKNOWN_NOISE }
@@ -448,7 +448,7 @@ impl Reprojection<'_> {
             if count >= self.push.spp && inside {
                 (at.triangle, at.instance, at.weights) = (h.triangle, h.instance, h.weights);
             }
-            let of_all = |variance: f32| if self.still() { variance } else { variance * freedom(count) };
+            let of_all = |variance: f32| if self.still() { variance } else { variance * (count - 1) as f32 };
             let stats = PixelStats { mean: h.mean, m2: h.variance.map(of_all), count, ..Default::default() };
             let (direct, albedo, indirect_m2) = (l.direct, l.albedo, of_all(l.indirect_variance));
             (stats, PixelLight { direct, albedo, indirect_m2, ..Default::default() })

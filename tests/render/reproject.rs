@@ -90,6 +90,25 @@ fn a_view_at_rest_has_the_variance_of_the_samples_that_count() {
     assert_silent(&gpu);
 }
 
+/// One sample has no deviations from its mean, however well the noise around is known: were a variance handed on with it, the next
+/// frame's would add to it, and so on without end.
+#[test]
+fn a_sample_that_moves_alone_has_no_variance() {
+    let gpu = gpu();
+    for way in WAYS {
+        let one = Reproject { reproject_samples: 1, ..by(way) };
+        let mut film = Film::new(&gpu, &scene("cornell-box/scene.toml", small), one);
+        film.frame(film.camera);
+        let known = film.stats().iter().filter(|s| s.m2[1] > 0.0).count();
+        film.begin(turned(film.camera, 0.3));
+        let begun = film.stats().into_iter().zip(film.light());
+        let alone: Vec<_> = begun.filter(|(s, _)| s.count == 1).collect();
+        assert!(alone.len() * 2 > known && known > 500, "{way:?}: control: {} of {known} move", alone.len());
+        assert!(alone.iter().all(|(s, l)| s.m2 == [0.0; 3] && l.indirect_m2 == 0.0), "{way:?}");
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn the_size_of_batches_changes_no_bit() {
     let gpu = gpu();

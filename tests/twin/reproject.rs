@@ -241,9 +241,12 @@ fn changes_of_light_are_shares_of_it() {
     assert_eq!([light_change::probe_cell_of(0, [9, 9]), light_change::probe_cell_of(9 * 4 + 8, [9, 9])], [0, 5]);
 }
 
+/// Farther apart than there are pixels.
+const NO_HOLES: usize = 1000;
+
 /// A near wall beside a far one, whose light differs by so much, in 16 x 9 pixels; every pixel has eight samples, of variance 1, and of
-/// those `carried`. What they hand on.
-fn handed_beside(other: &str, contrast: f32, carried: Carried) -> Vec<Carried> {
+/// those `carried`; one in `holes` has none. What they hand on.
+fn handed_beside(other: &str, contrast: f32, carried: Carried, holes: usize) -> Vec<Carried> {
     let mut scene = Workplace::new().scene(&format!(
         "[camera]\nposition = [0.0, 0.0, 6.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n[environment]\nradiance = 1.0\n\
          [[material]]\nname = 'lamp'\nemission = 9.0\n[[material]]\nname = 'wall'\n\
@@ -259,7 +262,8 @@ fn handed_beside(other: &str, contrast: f32, carried: Carried) -> Vec<Carried> {
     let wall = guide[0].object;
     let light = |g: &Guide| if g.object == wall { 1.0 } else { 1.0 + contrast };
     let of = |g: &Guide| PixelStats { mean: [light(g); 3], m2: [7.0; 3], count: 8, ..Default::default() };
-    let stats: Vec<_> = guide.iter().map(of).collect();
+    let mut stats: Vec<_> = guide.iter().map(of).collect();
+    stats.iter_mut().skip(holes / 2).step_by(holes).for_each(|s| *s = PixelStats::default());
     let left = Left {
         guide: &guide,
         points: &points,
@@ -276,7 +280,7 @@ fn handed_beside(other: &str, contrast: f32, carried: Carried) -> Vec<Carried> {
 
 /// How many of their samples those by the edge hand on.
 fn kept_beside(other: &str, contrast: f32) -> Vec<u32> {
-    let kept = handed_beside(other, contrast, Carried::default());
+    let kept = handed_beside(other, contrast, Carried::default(), NO_HOLES);
     assert!(kept.iter().filter(|c| !c.edge && c.count == 8).count() >= 144 - 2 * 9, "those away from it hand on all");
     [7, 8].map(|x| kept[4 * 16 + x].count).to_vec()
 }
@@ -292,10 +296,18 @@ fn edges_hand_on_what_is_worth_it() {
     assert_eq!(kept_beside("lamp", 0.0), [0, 0]);
 }
 
+/// A pixel that nothing was given is not a black one.
+#[test]
+fn pixels_without_samples_say_nothing_of_those_around() {
+    let handed = handed_beside("wall", 0.0, Carried::default(), 11);
+    let holes = (0..144).filter(|i| i % 11 == 5).count();
+    assert_eq!(handed.iter().map(|c| c.count).filter(|&n| n == 8).count(), 144 - holes, "{handed:?}");
+}
+
 #[test]
 fn new_samples_thin_age() {
     // Four samples that have moved six times, and four new ones: the mean over eight.
-    let handed = handed_beside("wall", 0.0, Carried { count: 4, age: 6, ..Carried::default() });
+    let handed = handed_beside("wall", 0.0, Carried { count: 4, age: 6, ..Carried::default() }, NO_HOLES);
     assert!(handed.iter().all(|c| [c.count, c.age] == [8, 3]), "{:?}", handed[0]);
 }
 
@@ -316,6 +328,25 @@ fn agreeing([a, b]: &[Begun; 2]) -> usize {
 fn kernels_agree_with_their_twin() {
     let gpu = gpu();
     WAYS.into_iter().for_each(|way| agree(&gpu, Reproject { reproject_samples: 4, ..by(way) }));
+    assert_silent(&gpu);
+}
+
+#[test]
+fn pixels_without_samples_agree_with_their_twin() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/glossy.toml", [49, 33]);
+    for way in WAYS {
+        let mut film = Film::new(&gpu, &scene, by(way));
+        film.frame(film.camera);
+        let mut stats = film.stats();
+        stats.iter_mut().step_by(7).for_each(|s| *s = PixelStats::default());
+        film.renderer.film().tiles[0].stats.write(0, &stats).unwrap();
+        let camera = turned(film.camera, 0.4);
+        let begun = both(&mut film, &scene, by(way), camera);
+        let (n, agree) = (begun[0].0.len(), agreeing(&begun));
+        let carried = begun[0].0.iter().filter(|&&word| carried_samples(word) > 0).count();
+        assert!(agree * 50 >= n * 49 && carried * 4 > n, "{way:?}: {agree} and {carried} of {n}");
+    }
     assert_silent(&gpu);
 }
 

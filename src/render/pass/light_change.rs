@@ -52,3 +52,44 @@ pub fn sum(rec: &mut Recorder, probes: &Probes) -> Result<()> {
     level(b, a, SPACINGS[1])?;
     level(a, b, SPACINGS[2])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{DeviceOptions, FrameResources, Gpu, Kernel, Location};
+    use crate::math::hash::pcg;
+    use crate::twins::light_change as twin;
+
+    /// Grids of one cell, one row or one column are summed, too, up to the last of each.
+    #[test]
+    fn sums_agree_with_their_twin() {
+        let gpu = Gpu::open(&DeviceOptions { validation: true, ..DeviceOptions::default() }).unwrap();
+        let kernel = Kernel::<light_change::Bind>::new(&gpu, &Default::default()).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        let unit = |i: u32, k: u32| pcg(pcg(i) ^ k) as f32 / u32::MAX as f32;
+        let change = |i: u32| {
+            let sum = [1, 2, 3].map(|k| 2.0 * unit(i, k) - 1.0);
+            let size = sum.iter().fold(0.0f32, |most, v| most.max(v.abs()));
+            LightChange { sum, size, squares: size * size, light: 1.0 + unit(i, 4), count: 1, ..Default::default() }
+        };
+        let found = |i: u32| if unit(i, 5) < 0.2 { LightChange::default() } else { change(i) };
+        for cells in [[1, 1], [17, 9], [64, 1], [65, 2], [1, 31], [40, 29]] {
+            let threads = cells[0] * cells[1];
+            let mut host: Vec<LightChange> = (0..threads).map(found).collect();
+            for spacing in SPACINGS {
+                let found = Buffer::from_slice(&gpu, "found", &host).unwrap();
+                let sums = Buffer::new(&gpu, "sums", host.len(), Location::Readback).unwrap();
+                let push = LightChangePush { cells, spacing, ..Default::default() };
+                let bind = light_change::Bind { found: &found, sums: &sums };
+                gpu.run(&mut frame, |rec| rec.dispatch_threads(&kernel, bind, &push, threads)).unwrap();
+                host = twin::sums(&host, cells, spacing);
+                for (i, (a, b)) in sums.read().unwrap().iter().zip(&host).enumerate() {
+                    let values = |c: &LightChange| [c.sum[0], c.sum[1], c.sum[2], c.squares, c.light, c.change, c.size];
+                    let near = values(a).iter().zip(values(b)).all(|(a, b)| (a - b).abs() <= 1e-5 * (1.0 + b.abs()));
+                    assert!(a.count == b.count && near, "{cells:?}, spacing {spacing}, cell {i}: {a:?} {b:?}");
+                }
+            }
+        }
+        assert_eq!(gpu.validation_messages(), Vec::<String>::new());
+    }
+}
