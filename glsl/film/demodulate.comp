@@ -30,6 +30,8 @@ struct Parts {
     vec3 sharp;
 };
 
+bool sampled(int i) { return count_at(i) > 0.0 && finite(colour_at(i)); }
+
 // The albedo that light is divided by and multiplied with is that of the samples, so that edges and textures keep their
 // antialiasing: a pixel that shows a surface in part has a part of its albedo.
 Parts split_light(int i) {
@@ -84,13 +86,33 @@ bool is_mirror(int i) {
     return alike.x > 0 && float(alike.y) > MIRRORED * float(count);
 }
 
+// For a pixel of lamps or sky without a sample: the mean of the pixels around that show some.
+vec3 light_around(int i) {
+    ivec2 size = ivec2(push.size), at = ivec2(i % size.x, i / size.x);
+    vec3 sum = vec3(0.0);
+    float count = 0.0;
+    for (int k = 0; k < 49; k++) {
+        ivec2 tap = at + ivec2(k % 7, k / 7) - 3;
+        if (any(lessThan(tap, ivec2(0))) || any(greaterThanEqual(tap, size))) continue;
+        int q = tap.y * size.x + tap.x;
+        if (!sampled(q) || reflects(albedo_at(q))) continue;
+        sum += colour_at(q);
+        count += 1.0;
+    }
+    return number(sum / max(count, 1.0));
+}
+
 // Lamps, sky and the pixels at their rims are not filtered: a rim's light divided by its small albedo would be far brighter
 // than its surroundings. What mirrors and clear glass show is filtered as it is.
 Parts split_albedo(int i) {
     vec3 colour = colour_at(i), albedo = albedo_at(i);
+    bool own = sampled(i);
     if (is_mirror(i)) return Parts(colour, vec3(1.0), vec3(0.0));
-    if (!reflects(albedo) || is_rim(i, colour, albedo)) return Parts(vec3(0.0), vec3(0.0), number(colour));
-    return Parts(colour / divisor(albedo), divisor(albedo), vec3(0.0));
+    if (!reflects(albedo)) return Parts(vec3(0.0), vec3(0.0), own ? colour : light_around(i));
+    if (own && is_rim(i, colour, albedo)) return Parts(vec3(0.0), vec3(0.0), colour);
+    vec3 factor = divisor(albedo);
+    for (int c = 0; c < 3; c++) if (albedo[c] == 0.0 && colour[c] == 0.0) factor[c] = 0.0;
+    return Parts(number(colour / factor), factor, vec3(0.0));
 }
 
 Parts demodulated(int i) {
@@ -109,6 +131,15 @@ Parts blurred(Parts p, int i) {
     p.factor = mix(p.factor, vec3(1.0), share);
     p.filtered = number((colour_at(i) - p.sharp) / p.factor);
     return p;
+}
+
+// Nothing is known of the light in a channel that a surface does not reflect: it is taken for the mean of the others. Were it 0, white
+// beside pure red would become red in a filter.
+vec3 with_unreflected(vec3 light, vec3 factor) {
+    bvec3 reflected = greaterThan(factor, vec3(0.0));
+    vec3 known = vec3(reflected), there = mix(vec3(0.0), light, reflected);
+    float mean = (there.r + there.g + there.b) / max(known.r + known.g + known.b, 1.0);
+    return mix(vec3(mean), light, reflected); // a choice, and exact
 }
 
 // Of the pixel's mean, per channel.
@@ -148,11 +179,13 @@ void main() {
     if (LENS) p = blurred(p, int(i));
     // Pixels whose filtered part is not used get count 0, so that they do not reach others.
     bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));
+    if (DEMODULATION == LIGHT) known = known && finite(PixelLight_direct(light, int(i)));
+    p.filtered = with_unreflected(p.filtered, p.factor);
     radiance[i] = vec4(p.filtered, known ? count : 0.0);
     float rest = 0.0;
     if (MEASURED) {
         vec3 of_filtered = variance_of_filtered(int(i), p, count);
-        variance[i] = of_filtered;
+        variance[i] = with_unreflected(of_filtered, p.factor);
         rest = variance_of_sharp(int(i), p.factor * p.factor * of_filtered, count);
     }
     factor[i] = vec4(p.factor, rest);

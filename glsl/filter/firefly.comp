@@ -14,8 +14,8 @@ layout(scalar, push_constant) uniform Push { FireflyPush push; };
 
 layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 
-bool dominated(int i, float bright) {
-    if (!MEASURED) return true;
+bool dominated(int i, float bright, float count) {
+    if (!MEASURED || count < 2.0) return true; // one sample has brought it all
     vec3 v = variance[i];
     return finite(v) && luminance(sqrt(max(v, vec3(0.0)))) > DOMINATED * bright;
 }
@@ -40,7 +40,7 @@ void main() {
         }
     }
     float most = push.factor * second, bright = luminance(here.rgb);
-    if (known >= 2 && 2 * lit > known && bright > most && dominated(own, bright)) {
+    if (known >= 2 && 2 * lit > known && bright > most && dominated(own, bright, here.w)) {
         here.rgb *= most / bright;
         if (MEASURED) variance[own] *= most / bright * (most / bright);
     }

@@ -65,12 +65,14 @@ pub fn reference(parts: &Parts, filtered: &[vec4], expected: &[vec3]) -> Option<
         let (whole, factor) = (Vec3::from(picture[i]), Vec3::from(parts.factor[i]));
         let light = factor * Vec3::from_slice(&filtered[i][..3]);
         let [error, noise, kept] = if input.radiance[i][3] > 0.0 { expected[i] } else { [0.0, 1.0, 0.0] };
-        let known = if input.radiance[i][3] > 0.0 { 1.0 } else { 0.0 };
         let sharp = noise_of_sharp(parts, i, noise * parts.sharp_variance[i]);
         let over = (whole * whole + EPSILON).recip() / 3.0;
-        let [before, after] = [known * noise * factor * factor * Vec3::from(variance[i]), error * light * light];
         let off = light - factor * Vec3::from_slice(&input.radiance[i][..3]);
-        let unbiased = known * off * off - (1.0 - 2.0 * kept) * before;
+        let (mut before, mut after, mut unbiased) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        if input.radiance[i][3] > 0.0 {
+            (before, after) = (noise * factor * factor * Vec3::from(variance[i]), error * light * light);
+            unbiased = off * off - (1.0 - 2.0 * kept) * before;
+        }
         let all = [(before + sharp).dot(over), (after + sharp).dot(over), (unbiased - after).dot(over), 1.0];
         if all.iter().all(|v| v.is_finite()) { all } else { [0.0; 4] }
     };

@@ -60,6 +60,10 @@ impl Pixels {
         if sampled { &self.light[i].albedo } else { &self.guide[i].albedo }
     }
 
+    fn sampled(&self, i: usize) -> bool {
+        self.count(i) > 0.0 && self.stats[i].mean.iter().all(|v| v.is_finite())
+    }
+
     fn count(&self, i: usize) -> f32 {
         if self.holds.of_file { f32::from_bits(self.stats[i].count) } else { self.stats[i].count as f32 }
     }
@@ -82,9 +86,10 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
     let parts: Vec<Part> = all.clone().map(|i| blurred(pixels, i, blur(i), part(pixels, demodulation, i))).collect();
     let factor: Vec<vec3> = parts.iter().map(|p| p.factor).collect();
     let radiance = |i: usize| {
-        let [r, g, b] = parts[i].filtered;
+        let [r, g, b] = with_unreflected(parts[i].filtered, &factor[i]);
         let known = pixels.stats[i].mean.iter().all(|v| v.is_finite()) && factor[i].iter().any(|&f| f > 0.0);
-        [r, g, b, if known { pixels.count(i) } else { 0.0 }]
+        let lit = demodulation != Demodulation::Light || pixels.light[i].direct.iter().all(|v| v.is_finite());
+        [r, g, b, if known && lit { pixels.count(i) } else { 0.0 }]
     };
     let measured = pixels.holds.variance_of_filtered(demodulation);
     let variance: Option<Vec<vec3>> =
@@ -93,6 +98,7 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
         |i: usize| variance.as_ref().map(|v| Vec3::from(factor[i]) * Vec3::from(factor[i]) * Vec3::from(v[i]));
     let rest = |i: usize| of_filtered(i).map_or(0.0, |filtered| variance_of_sharp(pixels, i, filtered));
     let sharp_variance = all.clone().map(rest).collect();
+    let variance = variance.map(|v| v.into_iter().zip(&factor).map(|(v, f)| with_unreflected(v, f)).collect());
     let [width, height] = pixels.size;
     let radiance = all.map(radiance).collect();
     let input = FilterInput { width, height, radiance, guide: pixels.guide.clone(), variance };
@@ -147,12 +153,17 @@ fn part(pixels: &Pixels, demodulation: Demodulation, i: usize) -> Part {
     match demodulation {
         Demodulation::Light => split_light(pixels, i),
         Demodulation::Albedo if is_mirror(pixels, i) => Part { filtered: colour, factor: [1.0; 3], sharp: [0.0; 3] },
-        Demodulation::Albedo if !reflects(albedo) || is_rim(pixels, i) => {
-            Part { filtered: [0.0; 3], factor: [0.0; 3], sharp: colour.map(number) }
+        Demodulation::Albedo if !reflects(albedo) => {
+            let sharp = if pixels.sampled(i) { colour } else { light_around(pixels, i) };
+            Part { filtered: [0.0; 3], factor: [0.0; 3], sharp }
+        }
+        Demodulation::Albedo if pixels.sampled(i) && is_rim(pixels, i) => {
+            Part { filtered: [0.0; 3], factor: [0.0; 3], sharp: colour }
         }
         Demodulation::Albedo => {
-            let factor = divisor(albedo);
-            Part { filtered: std::array::from_fn(|c| colour[c] / factor[c]), factor, sharp: [0.0; 3] }
+            let divisor = divisor(albedo);
+            let factor = std::array::from_fn(|c| if albedo[c] == 0.0 && colour[c] == 0.0 { 0.0 } else { divisor[c] });
+            Part { filtered: std::array::from_fn(|c| number(colour[c] / factor[c])), factor, sharp: [0.0; 3] }
         }
         Demodulation::Off => Part { filtered: colour, factor: [1.0; 3], sharp: [0.0; 3] },
     }
@@ -163,6 +174,21 @@ fn split_light(pixels: &Pixels, i: usize) -> Part {
     let factor = pixels.albedo(i).map(|a| number(a).max(0.0));
     let filtered = |c: usize| number((colour[c] - direct[c]) / factor[c]);
     Part { filtered: std::array::from_fn(filtered), factor, sharp: direct.map(number) }
+}
+
+/// For a pixel of lamps or sky without a sample: the mean of the pixels around that show some.
+fn light_around(pixels: &Pixels, i: usize) -> vec3 {
+    let shows = |&q: &usize| pixels.sampled(q) && !reflects(pixels.albedo(q));
+    let around: Vec<_> =
+        neighbours(pixels.size, i, 3).filter(shows).map(|q| Vec3::from(pixels.stats[q].mean)).collect();
+    (around.iter().sum::<Vec3>() / around.len().max(1) as f32).to_array().map(number)
+}
+
+/// Channels that a surface does not reflect (`factor` 0) take the mean of the others.
+fn with_unreflected(light: vec3, factor: &vec3) -> vec3 {
+    let known = || (0..3).filter(|&c| factor[c] > 0.0);
+    let mean = known().map(|c| light[c]).sum::<f32>() / known().count().max(1) as f32;
+    std::array::from_fn(|c| if factor[c] > 0.0 { light[c] } else { mean })
 }
 
 /// What the lens blurs is filtered as it is.
@@ -230,7 +256,7 @@ fn largest(v: &vec3) -> f32 {
 
 /// Beside something brighter that reflects nothing, and partly of it.
 fn is_rim(pixels: &Pixels, i: usize) -> bool {
-    let neighbours = || neighbours(pixels.size, i);
+    let neighbours = || neighbours(pixels.size, i, 1);
     let light = |q: usize| largest(&pixels.stats[q].mean);
     let albedo = |q: usize| pixels.albedo(q);
     if !neighbours().any(|q| !reflects(albedo(q)) && light(q) > light(i)) {
@@ -244,7 +270,7 @@ fn is_rim(pixels: &Pixels, i: usize) -> bool {
 
 /// Noisy or black without albedo, as most pixels around it are.
 fn is_mirror(pixels: &Pixels, i: usize) -> bool {
-    let around = || neighbours(pixels.size, i).chain([i]);
+    let around = || neighbours(pixels.size, i, 1).chain([i]);
     let smooth = |q: usize| !reflects(pixels.albedo(q)) && pixels.guide[q].depth > 0.0;
     let noisy = |q: usize| smooth(q) && largest(&pixels.stats[q].m2) > 0.0;
     let alike = |q: usize| noisy(q) || smooth(q) && largest(&pixels.stats[q].mean) == 0.0;
@@ -252,12 +278,12 @@ fn is_mirror(pixels: &Pixels, i: usize) -> bool {
     alike(i) && around().any(noisy) && count > MIRRORED * around().count() as f32
 }
 
-/// Up to eight.
-fn neighbours([width, height]: [u32; 2], i: usize) -> impl Iterator<Item = usize> {
+/// Those up to `reach` pixels away, but the pixel itself.
+fn neighbours([width, height]: [u32; 2], i: usize, reach: usize) -> impl Iterator<Item = usize> {
     let (width, height) = (width as usize, height as usize);
     let (x, y) = (i % width, i / width);
-    let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
-    let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
+    let rows = y.saturating_sub(reach)..=(y + reach).min(height - 1);
+    let columns = x.saturating_sub(reach)..=(x + reach).min(width - 1);
     rows.flat_map(move |y| columns.clone().map(move |x| y * width + x)).filter(move |&q| q != i)
 }
 

@@ -380,16 +380,20 @@ fn expected_errors_agree_with_their_twin() {
 /// 2.4 is .2 of colour off, and Stein's estimate takes half of the noise from its square where a quarter of a pixel is kept.
 #[test]
 fn expected_errors_solve_the_worked_example() {
-    let row = |sharp: [f32; 4], sharp_variance: f32, filtered: f32| {
+    let of = |first: vec4, sharp: [f32; 4], sharp_variance: f32, filtered: f32| {
         let mut input = picture::flat(4, 1);
         input.radiance.fill([2.0, 2.0, 2.0, 4.0]);
+        input.radiance[0] = first;
         input.variance = Some(vec![[0.04; 3]; 4]);
         let sharp = sharp.map(|v| [v; 3]).to_vec();
         let parts =
             Parts { input, sharp, factor: vec![[0.5; 3]; 4], sharp_variance: vec![sharp_variance; 4], direct: None };
         expected::reference(&parts, &[[filtered, filtered, filtered, 4.0]; 4], &[[0.01, 0.5, 0.25]; 4]).unwrap()
     };
+    let row = |sharp, sharp_variance, filtered| of([2.0, 2.0, 2.0, 4.0], sharp, sharp_variance, filtered);
     let near = |a: f64, b: f64| (a - b).abs() < 1e-5;
+    let broken = of([f32::NAN, f32::NAN, f32::NAN, 0.0], [0.0; 4], 0.0, 2.0);
+    assert!(near(broken.before, 0.75 * 0.005 / 1.01), "a pixel without samples has no noise: {broken:?}");
     let plain = row([0.0; 4], 0.1, 2.0);
     assert!(near(plain.before, 0.005 / 1.01) && near(plain.after, 0.01 / 1.01), "{plain:?}");
     let varied = row([0.0, 2.0, 0.0, 2.0], 0.1, 2.0);

@@ -77,7 +77,8 @@ impl Axis {
         let normal = normals.sum::<Vec3>().normalize_or_zero();
         let hits = pixels.map(|i| vector(aovs, Aov::Position, i)).filter(|p| *p != Vec3::ZERO).map(|p| -p.dot(normal));
         let (nearest, farthest) = hits.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), d| (a.min(d), b.max(d)));
-        Self { normal, nearest, margin: 0.1 * (farthest - nearest) }
+        let margin = if farthest > nearest { 0.1 * (farthest - nearest) } else { 1.0 };
+        Self { normal, nearest, margin }
     }
 
     fn depth(&self, position: Vec3) -> f32 {

@@ -13,7 +13,7 @@ use glam::Vec3;
 use std::str::FromStr;
 
 /// Which outliers are cut: pixels so many times brighter than the second brightest of the 24 around them, if one sample has brought
-/// their light. Without the variance of samples nothing tells, and stars and glints count as outliers too.
+/// their light. Without the variance of samples, or with one sample, nothing tells, and stars and glints count as outliers too.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Fireflies {
     /// None.
@@ -204,7 +204,7 @@ fn around(input: &FilterInput, at: usize) -> Vec<f32> {
 }
 
 fn dominated(input: &FilterInput, at: usize, bright: f32) -> bool {
-    let Some(variance) = &input.variance else { return true };
+    let Some(variance) = input.variance.as_ref().filter(|_| input.radiance[at][3] >= 2.0) else { return true };
     let v = Vec3::from(variance[at]);
     v.is_finite() && luminance(v.max(Vec3::ZERO).map(f32::sqrt)) > DOMINATED * bright
 }

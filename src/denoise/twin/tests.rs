@@ -31,6 +31,56 @@ fn lamps_and_their_rims_reach_no_other_pixel() {
     assert!(take_apart(&film(), Demodulation::Off).input.radiance.iter().all(|c| c[3] == 4.0));
 }
 
+/// Sky of 7 around a pixel of nothing or of what is no number, beside a wall: the filter says 3.
+#[test]
+fn sky_without_a_sample_is_that_around_it() {
+    for (bad, count) in [(0.0, 0), (f32::NAN, 4), (f32::INFINITY, 4)] {
+        let mut film = Film::new(5, 1);
+        film.add_vec3("", RGB, &[[7.0; 3], [7.0; 3], [bad, 0.0, 0.0], [7.0; 3], [1.0; 3]]);
+        film.add_vec3("albedo", RGB, &[[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [0.5; 3]]);
+        film.add("samples", Samples::U32(vec![4, 4, count, 4, 4]));
+        let joined = take_apart(&film, Demodulation::Albedo).remodulate(&[[3.0; 4]; 5]);
+        assert_eq!(joined, [[7.0; 3], [7.0; 3], [7.0; 3], [7.0; 3], [1.0; 3]], "{bad}: the wall beside is a rim");
+    }
+}
+
+/// A wall of albedo .4, of which nothing is known, between one of .5 and a lamp: it is no rim of the lamp.
+#[test]
+fn surfaces_without_a_sample_are_filled_in_beside_lamps() {
+    let mut film = Film::new(3, 1);
+    film.add_vec3("", RGB, &[[1.0; 3], [0.0; 3], [50.0; 3]]);
+    film.add_vec3("albedo", RGB, &[[0.5; 3], [0.4; 3], [0.0; 3]]);
+    film.add("samples", Samples::U32(vec![4, 0, 4]));
+    let parts = take_apart(&film, Demodulation::Albedo);
+    assert_eq!(parts.input.radiance[1][3], 0.0);
+    assert_eq!(parts.remodulate(&[[2.0; 4]; 3]), [[1.0; 3], [0.8; 3], [50.0; 3]]);
+}
+
+/// White and pure red in turn under light without noise: a mean over both leaves both as they are.
+#[test]
+fn saturated_colours_do_not_bleed() {
+    let mut film = Film::new(16, 16);
+    let albedo: Vec<vec3> = (0..256).map(|i| if (i / 16 + i) % 2 == 0 { [0.8; 3] } else { [0.8, 0.0, 0.0] }).collect();
+    film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+    film.add_vec3("", RGB, &albedo);
+    film.add_vec3("albedo", RGB, &albedo);
+    film.add_vec3("direct", RGB, &vec![[0.0; 3]; 256]);
+    film.add_vec3("indirect", RGB, &vec![[1.0; 3]; 256]);
+    film.add_vec3("variance", RGB, &vec![[0.01, 0.0, 0.0]; 256]);
+    film.add_vec3("N", ["X", "Y", "Z"], &vec![[0.0, 0.0, 1.0]; 256]);
+    let guided = crate::denoise::filter::find("guided").unwrap();
+    for demodulation in [Demodulation::Light, Demodulation::Albedo] {
+        let parts = take_apart(&film, demodulation);
+        assert!(parts.input.radiance.iter().all(|c| *c == [1.0, 1.0, 1.0, 4.0]), "{demodulation:?}");
+        let variance = parts.input.variance.as_ref().unwrap();
+        assert_eq!(variance[1], [variance[1][0]; 3], "{demodulation:?}");
+        let settings = crate::denoise::filter::FilterSettings::default().scaled_to(&parts.input);
+        let joined = parts.remodulate(&(guided.reference)(&parts.input, &settings));
+        let off = joined.iter().zip(&albedo).map(|(a, b)| Vec3::from(*a).distance((*b).into())).fold(0.0, f32::max);
+        assert!(off < 1e-4, "{demodulation:?}: {off}");
+    }
+}
+
 /// Three columns of glass, one of a wall, two of a lamp and its rim to the left, three of noisy sky. The middle of the glass is black by chance.
 #[test]
 fn what_mirrors_and_glass_show_is_filtered_as_it_is_and_lamps_and_sky_stay() {
@@ -100,6 +150,10 @@ fn direct_light_is_left_out_also_where_pixels_lack_it() {
     assert_eq!(parts.input.radiance.iter().map(|c| c[3]).collect::<Vec<_>>(), [4.0, 0.0, 4.0, 0.0]);
     assert_eq!(parts.remodulate(&[[1.0; 4]; 4])[1], [0.5, 1.0, 1.0]);
     assert_eq!(parts.direct.unwrap().radiance[1], [0.0; 4]);
+    // So does one of whose direct light alone that holds: what is left of the colour is no indirect light.
+    let red = film.channels.iter_mut().find(|c| c.name == "R").unwrap();
+    red.samples = Samples::F32(vec![1.0, 1.0, 25.0, 50.0]);
+    assert_eq!(take_apart(&film, Demodulation::Light).input.radiance[1][3], 0.0);
 }
 
 /// However the image is taken apart, and whatever its other layers hold.
@@ -201,4 +255,6 @@ fn positions_and_depths_are_made_of_each_other_and_it_is_said() {
     assert!(depths[0] > 0.0 && depths[1] == depths[0] + 1.0 && depths[2] == depths[0] + 2.0, "{depths:?}");
     assert_eq!(depths[3], 0.0, "no hit");
     assert!(notes.contains("depth: made of the position"), "{notes}");
+    let (guide, _) = guides(&|film| film.add_vec3("P", ["X", "Y", "Z"], &[[0.0, 1.0, 5.0]; 4]));
+    assert!(guide.iter().all(|g| g.depth > 0.0), "all as deep: {guide:?}");
 }

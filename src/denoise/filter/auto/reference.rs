@@ -136,7 +136,7 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     };
     let planes: [Vec<Vec4>; 3] = from_fn(|k| (0..image.len()).map(|i| errors(i)[k]).collect());
     let planes = planes.map(|plane| smoothed(plane, true));
-    let relative = |i: usize| planes.each_ref().map(|plane| plane[i] / planes[2][i].w.max(1.0));
+    let relative = |i: usize| planes.each_ref().map(|plane| plane[i]);
     let weights = |i: usize| {
         let (enough, [a, b, c, d]) = (image[i].count >= ENOUGH, results.usable(i));
         let usable = [enough, a, b, c, image[i].count >= ENOUGH_FOR_SVGF && d];
