@@ -198,6 +198,10 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     }
     if (FX_VERTEX_COLORS && (Material_flags(materials, light.material) & MATERIAL_UNLIT) != 0u)
         radiance *= vertex_color(Shading_load(shading, light.triangle), stored).rgb;
+    if (FX_CLEARCOAT) {
+        vec4 coordinates = FX_TEXTURES ? texture_coordinates(light.triangle, stored) : vec4(0.0);
+        radiance *= coat_lets_out(light.material, coordinates, cosine);
+    }
     // The shadow ray ends before the light, so that the light's own mask counts here.
     if (FX_ALPHA_MASKS) radiance *= surface_opacity(light.material, light.triangle, stored);
     bool lit = cosine > 0.0 && d2 > 0.0;
@@ -229,7 +233,9 @@ void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     s.direction = to_light / s.distance;
     bool lit = cap > 0.0 && d2 > 0.0 && dot(n, s.direction) < 0.0;
     s.pdf = lit ? light.probability / (2.0 * PI * cap) : 0.0;
-    s.radiance = lit ? light.value / s.pdf : vec3(0.0);
+    vec3 radiance = light.value;
+    if (FX_CLEARCOAT) radiance *= coat_lets_out(light.material, vec4(0.0), -dot(n, s.direction)); // lamps with pictures are no spheres
+    s.radiance = lit ? radiance / s.pdf : vec3(0.0);
 }
 
 // Share of a spot's intensity along `w`, from the point that it lights: it falls off smoothly between the two angles, linear in the

@@ -85,8 +85,21 @@ vec3 perturbed_normal(Surface s, Slopes slopes) {
 // Normals and tangents that depend on how texture coordinates lie on the surface.
 const bool SLOPES = FX_BUMP_MAPS || FX_NORMAL_MAPS || FX_COAT_NORMALS || FX_ANISOTROPIC, COORDINATES = FX_TEXTURES || SLOPES;
 
-void perturb(inout Surface s, Slopes slopes) {
-    if (FX_COAT_NORMALS) s.coat_normal = perturbed_coat(s, slopes);
+// Those of the coordinates at which `image` is read.
+Slopes slopes_for(uint image, Slopes first, Slopes second) {
+    if (FX_SECOND_UV && image != NONE) {
+        if ((Texture_flags(textures, image) & TEXTURE_SECOND_UV) != 0u) return second;
+    }
+    return first;
+}
+
+// `first`, `second`: slopes of the two sets of coordinates.
+void perturb(inout Surface s, Slopes first, Slopes second) {
+    if (FX_COAT_NORMALS) {
+        uint coat = Material_clearcoat_normal_texture(materials, s.material);
+        s.coat_normal = perturbed_coat(s, slopes_for(coat, first, second));
+    }
+    Slopes slopes = slopes_for(Material_bump_texture(materials, s.material), first, second);
     if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, slopes);
     if (FX_ANISOTROPIC && s.tangent.w == 0.0 && slopes.known) s.tangent.xyz = slopes.u;
 }

@@ -35,7 +35,7 @@ vec3 light_from_hit(Path path, Surface s, float t) {
     bool front = cosine > 0.0, shines = front || (FX_TWO_SIDED_LAMPS && (s.flags & MATERIAL_EMITS_BEHIND) != 0u);
     bool certain = path.delta || (FX_SPHERES && s.radius > 0.0 && !front); // light sampling does not choose a sphere's inside
     float weight = certain ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, abs(cosine)));
-    return FX_EMISSIVE && shines ? surface_emission(s) * weight : vec3(0.0);
+    return FX_EMISSIVE && shines ? surface_emission(s, abs(cosine)) * weight : vec3(0.0);
 }
 
 // By the probability of the lobe around the mirror image it is weighed against the others, as if these were diffuse: f cosine of the one is

@@ -102,7 +102,8 @@ Surface sphere_at(Hit hit) {
     s.color = vec4(1.0);
     s.tangent = vec4(0.0);
     s.brightness = 0.0;
-    if (SLOPES) perturb(s, Slopes(e1, e2, true));
+    Slopes slopes = Slopes(e1, e2, true);
+    if (SLOPES) perturb(s, slopes, slopes);
     return s;
 }
 
@@ -167,16 +168,15 @@ Surface surface_at(Hit hit) {
     if (COORDINATES) {
         vec2 d1 = at.uv1 - at.uv0, d2 = at.uv2 - at.uv0;
         s.uv = s.second_uv = at.uv0 + hit.b1 * d1 + hit.b2 * d2;
+        Slopes first = slopes_of(e1, e2, d1, d2), second = first;
         if (FX_SECOND_UV) {
             take_second_coordinates(at);
-            s.second_uv = at.uv0 + hit.b1 * (at.uv1 - at.uv0) + hit.b2 * (at.uv2 - at.uv0);
-            uint bump = Material_bump_texture(materials, s.material);
-            if (bump != NONE && (Texture_flags(textures, bump) & TEXTURE_SECOND_UV) != 0u) {
-                d1 = at.uv1 - at.uv0;
-                d2 = at.uv2 - at.uv0;
-            }
+            d1 = at.uv1 - at.uv0;
+            d2 = at.uv2 - at.uv0;
+            s.second_uv = at.uv0 + hit.b1 * d1 + hit.b2 * d2;
+            second = slopes_of(e1, e2, d1, d2);
         }
-        if (SLOPES) perturb(s, slopes_of(e1, e2, d1, d2));
+        if (SLOPES) perturb(s, first, second);
     }
     return s;
 }
@@ -302,10 +302,20 @@ float scaled(float constant, uint image, Surface s) {
     return constant * texture_sample(image, uv_of(s, image), false).r;
 }
 
-// Radiance that the surface emits from its front side.
-vec3 surface_emission(Surface s) {
+// Share of the light of a lamp that leaves its clear coat at `cosine` to the normal of its triangle: the coat is above what emits
+// (KHR_materials_clearcoat). Both ways to find the lamp have the same.
+float coat_lets_out(uint material, vec4 coordinates, float cosine) {
+    float coat = Material_clearcoat(materials, material);
+    if (coat == 0.0 || Material_kind(materials, material) != BSDF_METALLIC) return 1.0;
+    coat = textured_at(vec3(coat), Material_clearcoat_texture(materials, material), coordinates, false).r;
+    return 1.0 - coat * mix(COAT_F0, 1.0, schlick_weight(min(cosine, 1.0)));
+}
+
+// Radiance that the surface emits towards a viewer at `cosine` to the normal of its triangle.
+vec3 surface_emission(Surface s, float cosine) {
     vec3 emission = Material_emission(materials, s.material);
     if (FX_VERTEX_COLORS && (s.flags & MATERIAL_UNLIT) != 0u) emission *= s.color.rgb;
+    if (FX_CLEARCOAT) emission *= coat_lets_out(s.material, vec4(s.uv, s.second_uv), cosine);
     if (!FX_TEXTURES) return emission;
     uint image = Material_emission_texture(materials, s.material);
     return image == NONE ? emission : emission * texture_sample(image, uv_of(s, image), true).rgb;
@@ -363,6 +373,14 @@ Bsdf surface_bsdf(Surface s) {
         if (FX_TEXTURES && m.roughness_texture != NONE) {
             float r = texture_sample(m.roughness_texture, uv_of(s, m.roughness_texture), false).r; // perceptual: alpha = r^2
             b.alpha *= r * r;
+        }
+        // Neither a picture nor a key makes it smooth along one direction alone.
+        if (FX_ANISOTROPIC && b.stretch != 1.0) {
+            float across = b.alpha * b.stretch;
+            if (max(b.alpha, across) >= SMOOTH_ALPHA) {
+                b.alpha = max(b.alpha, SMOOTH_ALPHA);
+                b.stretch = max(across, SMOOTH_ALPHA) / b.alpha;
+            }
         }
     }
     return b;

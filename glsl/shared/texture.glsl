@@ -80,9 +80,10 @@ vec3 textured_at(vec3 constant, uint image, vec4 coordinates, bool color) {
     return constant * texture_sample(image, uv_of(coordinates, image), color).rgb;
 }
 
-// Share of light that a smooth wall lets straight through, as metallic_sample does: nothing else brings the light of a source
-// without extent behind it. `direction` is that of the ray in the space of the triangle; the normal is that of the triangle itself.
-vec3 clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycentric, vec3 direction) {
+// Whether a thin wall is smooth at a point. `share` is what of the light it lets straight through there, as metallic_sample does: nothing
+// else brings the light of a source without extent behind it. `direction` is that of the ray in the space of the triangle; the normal is
+// that of the triangle itself.
+bool clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycentric, vec3 direction, out vec3 share) {
     Material m = Material_load(materials, material);
     Triangle t = Triangle_load(triangles, triangle);
     vec3 n = cross(t.v1 - t.v0, t.v2 - t.v0);
@@ -97,12 +98,13 @@ vec3 clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycen
     vec4 at = FX_TEXTURES ? texture_coordinates(triangle, barycentric) : vec4(0.0);
     vec3 base = textured_at(m.base_color, m.base_texture, at, true);
     if (FX_VERTEX_COLORS) base *= vertex_color(Shading_load(shading, triangle), barycentric).rgb;
-    float metallic = textured_at(vec3(m.metallic), m.roughness_texture, at, false).b;
+    vec3 factors = textured_at(vec3(1.0), m.roughness_texture, at, false); // of roughness in g, of metal in b
     float through = textured_at(vec3(m.transmission_factor), m.transmission_texture, at, false).r;
     float f90 = textured_at(vec3(m.specular_factor), m.specular_factor_texture, at, false).r;
     vec3 specular = textured_at(m.specular, m.specular_texture, at, true);
     float f0 = min(largest_channel(specular), 1.0) * f90;
-    return base * (through * (1.0 - metallic) * (1.0 - mix(f0, f90, squared * squared * grazing)));
+    share = base * (through * (1.0 - m.metallic * factors.b) * (1.0 - mix(f0, f90, squared * squared * grazing)));
+    return m.alpha * factors.g * factors.g < SMOOTH_ALPHA;
 }
 
 // Whether a partly transparent surface stops a ray. A ray passes with the probability 1 - opacity, decided by a hash, so that the
@@ -111,8 +113,11 @@ vec3 clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycen
 bool mask_blocks(uint triangle, uint instance, vec2 barycentric, vec3 direction, uint seed) {
     uint material = material_of(triangle, instance);
     float opacity = surface_opacity(material, triangle, barycentric);
-    if (FX_CLEAR_WALLS && (seed & PASSES_WALLS) != 0u && (Material_flags(materials, material) & MATERIAL_CLEAR_WALL) != 0u)
-        return !pass_wall(1.0 - opacity * (1.0 - clear_wall_passes(material, triangle, instance, barycentric, direction)));
+    if (FX_CLEAR_WALLS && (seed & PASSES_WALLS) != 0u && (Material_flags(materials, material) & MATERIAL_CLEAR_WALL) != 0u) {
+        vec3 share;
+        if (clear_wall_passes(material, triangle, instance, barycentric, direction, share))
+            return !pass_wall(1.0 - opacity * (1.0 - share));
+    }
     // Two copies of a triangle on one ray decide independently.
     uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
     return opacity > unit_interval(pcg(seed ^ surface));

@@ -132,7 +132,8 @@ gpu_structs! {
         /// Luminance of the mean emission times the mean opacity, in units of a power of two that is 1 unless all lamps of the scene are
         /// dimmer. Emissive triangles are chosen in proportion to it times their area.
         emission_weight: float,
-        /// Index of refraction per channel (conductor), or interior / exterior in `x` (dielectric, coated).
+        /// Index of refraction per channel (conductor), or interior / exterior in `x` (dielectric, coated; metallic, where keys alone read
+        /// it).
         eta: vec3,
         /// Constant opacity in [0, 1]; multiplies `opacity_texture`.
         opacity: float,

@@ -25,6 +25,11 @@ fn unit(exponent: u32) -> f32 {
     f32::from_bits((exponent + 103) << 23) // 2^(exponent - 24)
 }
 
+/// Whether one of the numbers is [`LARGEST`].
+pub fn is_largest(word: u32) -> bool {
+    word >> 27 == 31 && [0, 9, 18].iter().any(|shift| word >> shift & 511 == 511)
+}
+
 /// The numbers that a word holds.
 pub fn unpack(word: u32) -> [f32; 3] {
     [0, 9, 18].map(|shift| (word >> shift & 511) as f32 * unit(word >> 27))

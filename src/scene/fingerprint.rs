@@ -1,4 +1,6 @@
 //! A number that identifies a scene, so that samples of one are not added to those of another.
+use super::Scene;
+use crate::layout::{Instance, Light, Material};
 use std::fmt;
 use xxhash_rust::xxh3::Xxh3Default;
 
@@ -33,6 +35,24 @@ impl fmt::Display for Fingerprint {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{:032x}", self.0.digest128())
     }
+}
+
+/// `content` with all that poses change.
+pub(in crate::scene) fn posed(scene: &Scene, mut content: Fingerprint) -> Fingerprint {
+    let rig = &scene.rig;
+    let mut copies: Vec<_> = scene.instances.clone();
+    for (&copy, instance) in rig.order.iter().zip(&scene.instances) {
+        let hidden = u32::from(rig.hidden.contains(&copy));
+        copies[copy as usize] = match hidden {
+            0 => Instance { root: rig.tree_of[copy as usize], ..*instance },
+            _ => Instance::default(),
+        };
+    }
+    content.add(&copies);
+    content.add(&scene.materials.iter().map(|m| Material { coat_table: 0, ..*m }).collect::<Vec<Material>>());
+    content.add::<Light>(&rig.lights);
+    rig.trees.iter().filter_map(|t| t.soft.as_ref()).for_each(|soft| content.add(soft.pose.as_bytes()));
+    content
 }
 
 #[cfg(test)]

@@ -75,15 +75,15 @@ pub struct Vertices {
 /// New numbers of a material, in the units of its [`MaterialTable`](super::description::MaterialTable).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaterialChange {
-    /// Albedo, or the tint of a conductor or mirror, from 0 to 1.
+    /// Albedo, or the tint of a conductor or mirror, from 0 to 1; of an unlit material what it emits.
     pub color: Option<[f32; 3]>,
-    /// Tint of specular reflection, from 0 to 1.
+    /// Tint of specular reflection, from 0 to 1; of metallic-roughness the factor of what its index reflects, up to 1e6.
     pub specular: Option<[f32; 3]>,
     /// Tint of transmission, from 0 to 1.
     pub transmission: Option<[f32; 3]>,
-    /// Radiance of the front side, W/(m^2 sr).
+    /// Radiance of the front side, W/(m^2 sr): with the strength that a table has apart.
     pub emission: Option<[f32; 3]>,
-    /// Microfacet roughness, from 0 to 1.
+    /// Microfacet roughness along u, from 0 to 1; that along v keeps its ratio to it. Of metallic-roughness the square of its `roughness`.
     pub alpha: Option<f32>,
     /// Opacity, from 0 to 1.
     pub opacity: Option<f32>,

@@ -48,6 +48,8 @@ pub struct Rig {
     pub(in crate::scene) tabled: HashSet<u32>,
     /// Fingerprint of the scene as it was loaded.
     pub(in crate::scene) content: Fingerprint,
+    /// Of that, what poses change.
+    pub(in crate::scene) rest: Fingerprint,
     placements: HashMap<String, usize>,
     moving: HashMap<String, usize>,
     lamps: HashMap<String, usize>,

@@ -7,7 +7,7 @@ use crate::scene::{Environment, Scene};
 use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
 use crate::twins::light_tree::{Choice, choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
-use crate::twins::surface::{Surface, plane_clearance, unit_vector};
+use crate::twins::surface::{Surface, coat_lets_out, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
 use glam::{Mat3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles, Vec4, Vec4Swizzles, vec2, vec3};
 use std::f32::consts::PI;
@@ -168,6 +168,9 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     if scene.materials[light.material as usize].flags & MATERIAL_UNLIT != 0 {
         radiance *= vertex_color(scene, light.triangle, bary).truncate();
     }
+    radiance *= coat_lets_out(&scene.materials[light.material as usize], cosine, |image| {
+        texture_sample(scene, image, texture_coordinates(scene, image, light.triangle, bary))
+    });
     radiance *= surface_opacity(scene, light.material, light.triangle, bary);
     let lit = cosine > 0.0 && d2 > 0.0;
     let density = match seen.by_solid_angle(scene) {
@@ -184,7 +187,7 @@ fn sphere_cap(to_centre: Vec3, radius: f32) -> f32 {
     if sine2 < 1.0 { sine2 / (1.0 + (1.0 - sine2).sqrt()) } else { 0.0 }
 }
 
-fn sample_sphere_light(light: &Light, p: Vec3, u: Vec2) -> LightSample {
+fn sample_sphere_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightSample {
     let (centre, radius) = (Vec3::from(light.a), light.b[0]);
     let to_centre = centre - p;
     let cap = sphere_cap(to_centre, radius);
@@ -199,10 +202,12 @@ fn sample_sphere_light(light: &Light, p: Vec3, u: Vec2) -> LightSample {
     let direction = to_light / distance;
     let lit = cap > 0.0 && distance > 0.0 && n.dot(direction) < 0.0;
     let pdf = if lit { light.probability / (2.0 * PI * cap) } else { 0.0 };
+    // Lamps whose coat has a picture are no spheres.
+    let coat = coat_lets_out(&scene.materials[light.material as usize], -n.dot(direction), |_| Vec4::ONE);
     LightSample {
         direction,
         distance,
-        radiance: if lit { Vec3::from(light.value) / pdf } else { Vec3::ZERO },
+        radiance: if lit { Vec3::from(light.value) * coat / pdf } else { Vec3::ZERO },
         pdf,
         sharp: false,
     }
@@ -289,7 +294,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
     }
     let mut sample = match light.kind {
         _ if light.is_triangle() => sample_triangle_light(scene, &light, p, u),
-        LIGHT_SPHERE => sample_sphere_light(&light, p, u),
+        LIGHT_SPHERE => sample_sphere_light(scene, &light, p, u),
         LIGHT_POINT | LIGHT_SPOT => sample_point_light(&light, p),
         LIGHT_DIRECTIONAL => LightSample {
             direction: -Vec3::from(light.b),

@@ -190,7 +190,7 @@ impl Tracer<'_> {
         let certain = path.delta || (s.radius > 0.0 && !front);
         let pdf = triangle_light_pdf(self.scene, s, path.origin, t, cosine.abs());
         let weight = if certain { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) };
-        surface_emission(self.scene, s) * weight
+        surface_emission(self.scene, s, cosine.abs()) * weight
     }
 
     /// The light, and whether it is sharp; `None` where no shadow ray is needed.

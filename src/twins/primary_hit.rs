@@ -32,7 +32,7 @@ pub fn through_lens(scene: &Scene, frame: &FrameConstants, pixel: u32) -> (Guide
         let point = vec2((k as f32 + 0.5) / LENS_RAYS as f32, unit_interval(k.reverse_bits()));
         let ray = camera_ray(&frame.camera, film, point);
         let Guide { normal, position, albedo, depth, .. } =
-            seen_hit(scene, frame, &ray, pcg(pixel).wrapping_add(k + 1)).guide;
+            seen_hit(scene, frame, &ray, pcg(pixel).wrapping_add(2 * (k + 1))).guide;
         let distance = if depth > 0.0 { depth } else { INFINITE_DISTANCE };
         blur += lens_blur(&frame.camera, distance * ray.direction.dot(frame.camera.forward.into()), frame.path.size);
         if depth > 0.0 {

@@ -1,12 +1,14 @@
 //! Twin of `glsl/shared/surface.glsl` and `glsl/shared/normal_map.glsl`.
 use crate::layout::{
-    BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_NORMAL_MAP, MATERIAL_TWO_SIDED, MATERIAL_UNLIT, Material, NONE, Texture,
+    BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_NORMAL_MAP, MATERIAL_TWO_SIDED, MATERIAL_UNLIT, Material, NONE,
+    SMOOTH_ALPHA, Texture,
 };
 use crate::math::octahedral::{octahedral_decode, octahedral_vector};
 use crate::math::warp::basis_from_normal;
 use crate::scene::attributes::Attributes;
 use crate::scene::lookup::reads_second;
 use crate::scene::{FLAT, Scene};
+use crate::shaders::shared::metallic::COAT_F0;
 use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
 use crate::twins::bsdf::{Bsdf, bsdf_is_specular};
 use crate::twins::metallic::{Metallic, Parameters};
@@ -158,17 +160,21 @@ fn normal_or_smooth(s: &Surface, n: Option<Vec3>) -> Vec3 {
     if length > 0.0 && length < 1e37 { n } else { s.smooth_normal }
 }
 
-/// Perturbs the normals of a surface, whose normal is the smooth one so far.
-fn perturb(scene: &Scene, s: &mut Surface, slopes: Slopes) {
+/// Perturbs the normals of a surface, whose normal is the smooth one so far, by the slopes of its two sets of coordinates.
+fn perturb(scene: &Scene, s: &mut Surface, [first, second]: [Slopes; 2]) {
     let material = &scene.materials[s.material as usize];
     let (image, coat) = (material.bump_texture, material.clearcoat_normal_texture);
+    let slopes_for = |image| if image != NONE && reads_second(scene, image) { second } else { first };
+    let slopes = slopes_for(image);
     let own = match s.flags & MATERIAL_NORMAL_MAP {
         _ if image == NONE => None,
         0 => slopes.map(|slopes| normal_from_height(scene, s, material, slopes)),
         _ => normal_from_map(scene, s, image, material.normal_scale, slopes),
     };
-    let coat =
-        if coat == NONE { None } else { normal_from_map(scene, s, coat, material.clearcoat_normal_scale, slopes) };
+    let coat = match coat {
+        NONE => None,
+        _ => normal_from_map(scene, s, coat, material.clearcoat_normal_scale, slopes_for(coat)),
+    };
     s.normal = normal_or_smooth(s, own);
     s.coat_normal = normal_or_smooth(s, coat);
     if let Some([along, _]) = slopes.filter(|_| s.tangent.w == 0.0) {
@@ -205,7 +211,7 @@ fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
         radius,
         ..Surface::bare(scene, hit, centre + point, geometric, clearance)
     };
-    perturb(scene, &mut s, Some([e1, e2]));
+    perturb(scene, &mut s, [Some([e1, e2]); 2]);
     s
 }
 
@@ -238,10 +244,11 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         s.smooth_normal = s.normal;
     }
     let [uv0, uv1, uv2] = [shading.uv0, shading.uv1, shading.uv2].map(Vec2::from);
-    let (mut d1, mut d2) = (uv1 - uv0, uv2 - uv0);
+    let (d1, d2) = (uv1 - uv0, uv2 - uv0);
     let b = hit.barycentric;
     s.uv = uv0 + b.x * d1 + b.y * d2;
     s.second_uv = s.uv;
+    let mut slopes = [slopes_of(e1, e2, d1, d2); 2];
     let attributes = Attributes::of(scene, shading);
     s.color = attributes.color(b);
     s.tangent = attributes.tangent(b);
@@ -250,13 +257,11 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         s.tangent = world_from_object(i).vector(s.tangent.truncate()).extend(sign);
     }
     if let Some([uv0, uv1, uv2]) = attributes.second_coordinates() {
-        s.second_uv = uv0 + b.x * (uv1 - uv0) + b.y * (uv2 - uv0);
-        let bump = scene.materials[s.material as usize].bump_texture;
-        if bump != NONE && reads_second(scene, bump) {
-            (d1, d2) = (uv1 - uv0, uv2 - uv0);
-        }
+        let (d1, d2) = (uv1 - uv0, uv2 - uv0);
+        s.second_uv = uv0 + b.x * d1 + b.y * d2;
+        slopes[1] = slopes_of(e1, e2, d1, d2);
     }
-    perturb(scene, &mut s, slopes_of(e1, e2, d1, d2));
+    perturb(scene, &mut s, slopes);
     s
 }
 
@@ -388,11 +393,21 @@ fn textured(scene: &Scene, constant: [f32; 3], image: u32, s: &Surface) -> Vec3 
     }
 }
 
-/// Radiance that the surface emits from its front side.
-pub fn surface_emission(scene: &Scene, s: &Surface) -> Vec3 {
+/// Share of the light of a lamp that leaves its clear coat at `cosine`; `picture` looks up a texture.
+pub fn coat_lets_out(m: &Material, cosine: f32, picture: impl Fn(u32) -> Vec4) -> f32 {
+    if m.kind != BSDF_METALLIC || m.clearcoat == 0.0 {
+        return 1.0;
+    }
+    let coat = m.clearcoat * if m.clearcoat_texture == NONE { 1.0 } else { picture(m.clearcoat_texture).x };
+    1.0 - coat * (COAT_F0 + (1.0 - COAT_F0) * (1.0 - cosine.min(1.0)).powi(5))
+}
+
+/// Radiance that the surface emits towards a viewer at `cosine` to the normal of its triangle.
+pub fn surface_emission(scene: &Scene, s: &Surface, cosine: f32) -> Vec3 {
     let material = &scene.materials[s.material as usize];
     let unlit = material.flags & MATERIAL_UNLIT != 0;
-    let emission = Vec3::from(material.emission) * if unlit { s.color.truncate() } else { Vec3::ONE };
+    let coat = coat_lets_out(material, cosine, |image| texture_sample(scene, image, uv_of(scene, s, image)));
+    let emission = Vec3::from(material.emission) * if unlit { s.color.truncate() } else { Vec3::splat(coat) };
     match material.emission_texture {
         NONE => emission,
         image => emission * texture_sample(scene, image, uv_of(scene, s, image)).truncate(),
@@ -430,6 +445,11 @@ pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
         alpha *= r * r;
     }
     let mut b = Bsdf::new(material, alpha, &scene.texels);
+    let across = b.alpha * b.stretch;
+    if b.stretch != 1.0 && b.alpha.max(across) >= SMOOTH_ALPHA {
+        b.alpha = b.alpha.max(SMOOTH_ALPHA);
+        b.stretch = across.max(SMOOTH_ALPHA) / b.alpha;
+    }
     b.albedo = textured(scene, material.base_color, material.base_texture, s) * s.color.truncate();
     b.specular = textured(scene, material.specular, material.specular_texture, s);
     if material.kind == BSDF_METALLIC {

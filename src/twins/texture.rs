@@ -1,5 +1,5 @@
 //! Twin of `glsl/shared/texture.glsl`.
-use crate::layout::{MATERIAL_CLEAR_WALL, MATERIAL_MASKED, Material, NONE, SPHERE};
+use crate::layout::{MATERIAL_CLEAR_WALL, MATERIAL_MASKED, Material, NONE, SMOOTH_ALPHA, SPHERE};
 use crate::math::hash::{pcg, unit_interval};
 use crate::math::octahedral::octahedral_vector;
 use crate::scene::Scene;
@@ -34,14 +34,14 @@ pub fn vertex_color(scene: &Scene, triangle: u32, barycentric: Vec2) -> Vec4 {
     scene.shading.get(triangle as usize).map_or(Vec4::ONE, |s| Attributes::of(scene, s).color(barycentric))
 }
 
-/// Share of light that a smooth clear wall lets straight through.
+/// Share of light that a clear wall lets straight through where it is smooth.
 fn clear_wall_passes(
     scene: &Scene,
     m: &Material,
     (triangle, instance): (u32, u32),
     barycentric: Vec2,
     direction: Vec3,
-) -> Vec3 {
+) -> Option<Vec3> {
     let t = &scene.triangles[triangle as usize];
     let [a, b, c] = [t.v0, t.v1, t.v2].map(Vec3::from);
     let n = if t.primitive & SPHERE != 0 { octahedral_vector(barycentric) } else { (b - a).cross(c - a) };
@@ -58,11 +58,13 @@ fn clear_wall_passes(
     let tint = picture(m.base_texture) * vertex_color(scene, triangle, barycentric);
     let base = Vec3::from(m.base_color) * tint.truncate();
     let through = m.transmission_factor * picture(m.transmission_texture).x;
-    let metallic = m.metallic * picture(m.roughness_texture).z;
+    let factors = picture(m.roughness_texture);
+    let metallic = m.metallic * factors.z;
     let f90 = m.specular_factor * picture(m.specular_factor_texture).x;
     let f0 = (Vec3::from(m.specular) * picture(m.specular_texture).truncate()).max_element().min(1.0) * f90;
     let reflected = f0 + (f90 - f0) * (1.0 - cosine.min(1.0)).powi(5);
-    base * (through * (1.0 - metallic) * (1.0 - reflected))
+    let is_smooth = m.alpha * factors.y * factors.y < SMOOTH_ALPHA;
+    is_smooth.then(|| base * (through * (1.0 - metallic) * (1.0 - reflected)))
 }
 
 /// Of a seed of masks, without the bit of shadow rays that pass clear walls.
@@ -77,8 +79,10 @@ pub fn mask_leaves(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec
     let material = &scene.materials[number as usize];
     let opacity = surface_opacity(scene, number, triangle, barycentric);
     if seed & PASSES_WALLS != 0 && material.flags & MATERIAL_CLEAR_WALL != 0 {
-        return 1.0
-            - opacity * (1.0 - clear_wall_passes(scene, material, (triangle, instance), barycentric, direction));
+        let passes = clear_wall_passes(scene, material, (triangle, instance), barycentric, direction);
+        if let Some(share) = passes {
+            return 1.0 - opacity * (1.0 - share);
+        }
     }
     let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
     let blocks = opacity > unit_interval(pcg(seed ^ surface));

@@ -109,7 +109,6 @@ pub fn with_pictures_of(found: &Material, numbers: Material) -> Material {
         emission_weight: found.emission_weight,
         coat_table: found.coat_table,
         // What only other kinds of materials read.
-        eta: [1.5; 3],
         transmission: [1.0; 3],
         bump_scale: 1.0,
         kind: BSDF_METALLIC,
@@ -136,6 +135,7 @@ fn every_number_goes_to_its_place() {
         transmission_factor: 0.375,
         specular_factor: 0.875,
         specular: [0.0625, 0.125, 0.5], // a quarter, which an index of 3 reflects head on
+        eta: [3.0; 3],
         ..Material::default()
     };
     assert_eq!(found, with_pictures_of(&found, numbers));
@@ -162,9 +162,17 @@ fn every_number_goes_to_its_place() {
         clearcoat_normal_scale: 1.0,
         specular_factor: 1.0,
         specular: [0.2f32.powi(2); 3], // an index of 1.5
+        eta: [1.5; 3],
         ..Material::default()
     };
     assert_eq!(found, with_pictures_of(&found, defaults));
+
+    // As those that came of specular and glossiness have it: all that the colour says is reflected.
+    let mut converted = with_pictures();
+    converted["materials"][0] = json!({
+        "extensions": { "KHR_materials_ior": { "ior": 0 }, "KHR_materials_specular": { "specularColorFactor": [0.9, 0.5, 0.125] } }
+    });
+    assert_eq!(load(&converted).materials[0].specular, [0.9, 0.5, 0.125]);
 }
 
 #[test]

@@ -71,6 +71,40 @@ fn a_refitted_mesh_keeps_its_lights_and_instances_and_the_way_does_not_count() {
     }
 }
 
+/// A scene that is where it was loaded is that scene: its files can be resumed, however it came there.
+#[test]
+fn a_pose_that_changes_nothing_leaves_the_scene_what_it_is() {
+    let text = "[camera]\nworld_from_camera = [1,0,0,0, 0,1,0,0, 0,0,1,9, 0,0,0,1]\n[environment]\nradiance = 1\n\
+        [[mesh]]\nname = 'box'\nshape = 'cube'\n[[instance]]\nname = 'door'\nmesh = 'box'\n";
+    let free = text.replace("world_from_camera = [1,0,0,0, 0,1,0,0, 0,0,1,9, 0,0,0,1]", "");
+    let (mut scene, mut framed) = (scene_of(text), scene_of(&free));
+    let size = [4, 3];
+    let known = scene.fingerprint(size).unwrap();
+    let is_known = |scene: &Scene| scene.fingerprint(size).unwrap() == known;
+    scene.apply(&Pose::default()).unwrap();
+    assert!(is_known(&scene), "a pose that says nothing");
+    scene.apply(&Pose { camera: Some(scene.view.clone()), ..Pose::default() }).unwrap();
+    assert!(is_known(&scene), "the same camera");
+    let to = |x: f64| Pose {
+        instances: vec![(
+            0,
+            Transform::try_from([1., 0., 0., x, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.]).unwrap(),
+        )],
+        ..Pose::default()
+    };
+    // A camera with a matrix does not look elsewhere because something moves; one that frames the scene does, if only from a target.
+    let mut aimed = scene_of(&free.replace("[camera]", "[camera]\ntarget = [0, 0, 0]"));
+    assert!(!scene.apply(&to(4.0)).unwrap().camera && framed.apply(&to(4.0)).unwrap().camera);
+    assert!(aimed.apply(&to(0.25)).unwrap().camera, "however little the film's other shape would show of it");
+    assert!(!is_known(&scene), "control");
+    scene.apply(&to(0.0)).unwrap();
+    assert!(is_known(&scene), "away and back");
+}
+
+fn scene_of(text: &str) -> Scene {
+    Scene::parse(Path::new("door.toml"), text).unwrap().scene
+}
+
 /// Pixels of a scene at rest keep all that they have, whatever is said again of where things are.
 #[test]
 fn the_same_pose_again_changes_nothing() {
@@ -110,6 +144,38 @@ fn a_tree_over_lamps_follows_them() {
     let lit = MaterialChange { emission: Some([3.0; 3]), ..MaterialChange::default() };
     scene.apply(&Pose { materials: vec![(0, lit)], ..Pose::default() }).unwrap();
     assert_eq!(scene.light_nodes, at(4.0, 3.0).light_nodes);
+}
+
+/// A key that says what the table says changes nothing.
+#[test]
+fn numbers_of_materials_are_those_of_their_tables() {
+    let text = "[camera]\nposition = [0, 0, 9]\n[environment]\nradiance = 1\n\
+        [[material]]\nname = 'plastic'\ntype = 'metallic-roughness'\nmetallic = 0\nspecular = [1.5, 1.0, 0.5]\nior = 1.8\n\
+        [[material]]\nname = 'sign'\ntype = 'metallic-roughness'\nunlit = true\ncolor = [0.5, 0.25, 1.0]\n\
+        [[material]]\nname = 'copper'\ntype = 'conductor'\nmetal = 'Cu'\nspecular = 0.8\nalpha = 0.2\nalpha_v = 0.4\n\
+        [[mesh]]\nshape = 'sphere'\nmaterial = 'plastic'\n[[mesh]]\nshape = 'sphere'\nmaterial = 'sign'\n\
+        [[mesh]]\nshape = 'sphere'\nmaterial = 'copper'\n";
+    let mut scene = Scene::parse(Path::new("three.toml"), text).unwrap().scene;
+    let before = scene.materials.clone();
+    let changes = [
+        MaterialChange { specular: Some([1.5, 1.0, 0.5]), ..MaterialChange::default() },
+        MaterialChange { color: Some([0.5, 0.25, 1.0]), ..MaterialChange::default() },
+        MaterialChange { specular: Some([0.8; 3]), alpha: Some(0.2), ..MaterialChange::default() },
+    ];
+    let pose = |factor: f32| {
+        let dimmed = |c: MaterialChange| MaterialChange {
+            specular: c.specular.map(|v| v.map(|v| factor * v)),
+            color: c.color.map(|v| v.map(|v| factor * v)),
+            ..c
+        };
+        Pose { materials: changes.into_iter().map(dimmed).enumerate().collect(), ..Pose::default() }
+    };
+    scene.apply(&pose(1.0)).unwrap();
+    assert_eq!(scene.materials, before);
+    scene.apply(&pose(0.5)).unwrap();
+    let halved = |i: usize| before[i].specular.map(|v| 0.5 * v);
+    assert_eq!([scene.materials[0].specular, scene.materials[2].specular], [halved(0), halved(2)], "control");
+    assert_eq!((scene.materials[1].emission, scene.materials[1].base_color), ([0.25, 0.125, 0.5], [0.0; 3]));
 }
 
 /// Checks that all corners below a node lie in the boxes of its children, which reach beyond them by two cells of their grid, and what

@@ -471,7 +471,7 @@ fn shares(scene: &Loaded) -> [f64; 2] {
         let cosine = direction.y.max(0.0);
         let (s, t) = hit(scene, direction).next()?;
         let pdf = triangle_light_pdf(scene, &s, HERE, t, -s.geometric.dot(direction));
-        let radiance = f64::from(surface_emission(scene, &s).x);
+        let radiance = f64::from(surface_emission(scene, &s, -s.geometric.dot(direction)).x);
         Some(radiance * f64::from(cosine) * weighed(cosine / PI as f32, pdf) * area)
     };
     let grid = Grid { world_from_sky: Mat3::IDENTITY };

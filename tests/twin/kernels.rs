@@ -106,7 +106,8 @@ fn spheres() -> Loaded {
     let mut scene = place.scene(
         "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\n[render]\nmax_depth = 4\n\
          [environment]\nradiance = 0.3\n[[material]]\nname = 'lamp'\nemission = 9.0\nemission_two_sided = true\n\
-         [[material]]\nname = 'glass'\ntype = 'dielectric'\n[[material]]\nname = 'bumpy'\ntype = 'coated'\nalpha = 0.2\n\
+         type = 'metallic-roughness'\nclearcoat = 1.0\n[[material]]\nname = 'glass'\n\
+         type = 'dielectric'\n[[material]]\nname = 'bumpy'\ntype = 'coated'\nalpha = 0.2\n\
          color_texture = 'checks.png'\nbump = 'checks.png'\nbump_scale = 0.05\n\
          [[material]]\nname = 'mapped'\nnormal_map = 'bumps.png'\nopacity = 0.8\nopacity_texture = 'checks.png'\n\
          [[mesh]]\nshape = 'rectangle'\ntransform = { rotate = [-90.0, 0.0, 0.0], scale = 4.0 }\n\
@@ -190,7 +191,7 @@ pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
 
 fn near(a: impl Into<Vec3>, b: impl Into<Vec3>, tolerance: f32) -> bool {
     let (a, b): (Vec3, Vec3) = (a.into(), b.into());
-    (a - b).abs().max_element() <= tolerance * (1.0 + a.abs().max_element())
+    (a - b).abs().cmple(Vec3::splat(tolerance * (1.0 + b.abs().max_element()))).all()
 }
 
 /// Share of samples whose direct and indirect light and albedo agree.

@@ -464,6 +464,41 @@ fn metal_is_smoother_along_v_where_its_coordinates_say_so() {
     assert_eq!(frame(brushed(None), flat(false), place([0.0; 3], 1.0)).2, 1.0);
 }
 
+/// What makes a brushed metal smoother, a picture or a key, leaves it rough along both directions or none: .01 is the least.
+#[test]
+fn metal_is_not_smooth_along_one_direction_alone() {
+    let gpu = gpu();
+    let brushed = |alpha, alpha_v| MaterialTable {
+        name: "m".into(),
+        kind: MaterialType::Conductor,
+        alpha,
+        alpha_v: Some(alpha_v),
+        roughness_texture: texture("bumps"),
+        ..MaterialTable::default()
+    };
+    let roughness = |scene: &Scene| {
+        let b = surface_bsdf(scene, &surface(scene, 0.3, -0.4));
+        [b.alpha, b.alpha * b.stretch]
+    };
+    let plain = roughness(&one(brushed(0.4, 0.2), patch(), place([0.0; 3], 1.0), false));
+    let share = plain[0] / 0.4;
+    assert!((0.2..0.6).contains(&share) && (plain[1] / 0.2 - share).abs() < 1e-6, "control: {plain:?}");
+    for (of, expected) in [
+        ([0.01, 0.3], [0.01, 0.3 * share]),
+        ([0.3, 0.01], [0.3 * share, 0.01]),
+        ([0.012, 0.015], [0.012 * share, 0.015 * share]),
+    ] {
+        let mut loaded =
+            Loaded { scene: one(brushed(of[0], of[1]), patch(), place([0.0; 3], 1.0), false), ..Loaded::default() };
+        let found = roughness(&loaded.scene);
+        assert!((0..2).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-5), "{of:?}: {found:?}, not {expected:?}");
+        small(&mut loaded.settings);
+        let effects = called_for(&loaded, &loaded.settings, Outputs::FILTERED);
+        check(&format!("brushed, {of:?}"), &run(&gpu, &loaded, effects));
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn a_clear_coat_has_normals_of_its_own() {
     let coated = |own: bool, base: bool| MaterialTable {

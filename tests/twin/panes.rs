@@ -12,12 +12,15 @@ const PANE: &str = "[[material]]\nname = 'pane'\ntype = 'metallic-roughness'\nme
 /// way, a pane of colour, and a veil.
 pub fn panes() -> Loaded {
     let workplace = Workplace::new().picture("stained.png", 4, |x, y| [255 - 40 * x as u8, 160, 60 * y as u8]);
+    let workplace = workplace.picture("rough.png", 4, |x, _| [0, if x < 2 { 20 } else { 200 }, 255]);
     let mut scene = workplace.scene(&format!(
         "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\n[render]\nmax_depth = 4\n\
          [environment]\nradiance = 0.2\n[[light]]\ntype = 'directional'\ndirection = [0.3, -1.0, -0.4]\nirradiance = 3.0\n\
          [[light]]\ntype = 'point'\nposition = [-1.2, 0.8, 0.0]\nintensity = 4.0\n{PANE}color = 0.95\n\
          [[material]]\nname = 'red'\ntype = 'metallic-roughness'\nmetallic = 0.0\nroughness = 0.0\ntransmission_factor = 1.0\n\
-         color = [0.9, 0.3, 0.3]\ncolor_texture = 'stained.png'\ntransmission_texture = 'stained.png'\n[[material]]\nname = 'veil'\nopacity = 0.5\n\
+         color = [0.9, 0.3, 0.3]\ncolor_texture = 'stained.png'\ntransmission_texture = 'stained.png'\n\
+         [[material]]\nname = 'etched'\ntype = 'metallic-roughness'\nmetallic = 0.0\nmetallic_roughness_texture = 'rough.png'\n\
+         transmission_factor = 0.8\n[[material]]\nname = 'veil'\nopacity = 0.5\n\
          [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 4.0 }}\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'pane'\n\
          transform = {{ translate = [1.2, 1.5, 0.5], rotate = [-60.0, 0.0, 0.0], scale = 0.8 }}\n\
@@ -25,6 +28,7 @@ pub fn panes() -> Loaded {
          [[mesh]]\nshape = 'sphere'\nmaterial = 'red'\ntransform = {{ translate = [0.9, 0.5, -0.8], scale = 0.3 }}\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'red'\ntransform = {{ translate = [-0.3, 1.2, -1.0], rotate = [-40.0, 0.0, 0.0] }}\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'veil'\ntransform = {{ translate = [0.5, 0.6, 1.5], scale = 0.4 }}\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'etched'\ntransform = {{ translate = [-0.4, 0.8, 1.2], rotate = [-60.0, 0.0, 0.0] }}\n\
          [[mesh]]\nname = 'window'\nshape = 'rectangle'\nmaterial = 'pane'\n\
          [[instance]]\nmesh = 'window'\ntransform = {{ translate = [0.2, 1.1, 0.2], rotate = [-80.0, 10.0, 0.0], scale = 0.5 }}\n\
          [[instance]]\nmesh = 'window'\ntransform = {{ translate = [-0.8, 2.0, 1.0], rotate = [70.0, 0.0, 0.0], scale = [0.6, 1.2, -0.6] }}\n"
@@ -115,6 +119,25 @@ fn sun_and_bulb_shine_through_panes() {
     let lamp = "[[material]]\nname = 'lamp'\ncolor = 0\nemission = 1\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
                 transform = { translate = [0.0, 3.0, 0.0], rotate = [90.0, 0.0, 0.0], scale = 2.0 }\n";
     assert_eq!(floor(&format!("{lamp}{tinted}{window}")), [0.0; 3]);
+}
+
+/// Where a picture makes a rough pane smooth, it is as one that is smooth everywhere; elsewhere microfacets bring the light.
+#[test]
+fn the_picture_of_roughness_says_where_a_pane_is_clear() {
+    let sun = "[[light]]\ntype = 'directional'\nirradiance = 1.0\ndirection = [0.0, -1.0, 0.0]\n";
+    let pane = |roughness: f32, more: &str| {
+        let pane = PANE.replace("roughness = 0.0", &format!("roughness = {roughness:?}"));
+        format!(
+            "{sun}{pane}{more}\n[[mesh]]\nmaterial = 'pane'\nshape = 'rectangle'\n\
+             transform = {{ translate = [0.0, 2.0, 0.0], rotate = [-90.0, 0.0, 0.0], scale = 9.0 }}\n"
+        )
+    };
+    let clear = floor(&pane(0.0, ""));
+    let picture = |of: fn(u32) -> u8| Workplace::new().picture("rough.png", 64, move |x, _| [255, of(x), 255]);
+    let smoothed = pane(1.0, "metallic_roughness_texture = { file = 'rough.png', filter = 'nearest' }");
+    assert_eq!(floor_in(&picture(|_| 0), &smoothed), clear);
+    let half = floor_in(&picture(|x| if x < 32 { 0 } else { 255 }), &smoothed)[0] / clear[0];
+    assert!((half - 0.5).abs() < 0.02, "{half} of the light passes straight, and no path of two segments brings more");
 }
 
 /// Half of a window is red, half is blue; the sun shines through both onto what the camera sees.

@@ -484,11 +484,48 @@ fn other_light(scene: &Loaded) -> f64 {
         let word = (random.unit() * 4_294_967_296.0) as u32;
         let s = light_sample(scene, &Receiver::point(p), word, vec2(random.unit(), random.unit()));
         let hit = closest(scene, p, s.direction);
-        let met = if hit.any() { surface_emission(scene, &surface_at(scene, &hit)) } else { Vec3::ZERO };
+        let met = if hit.any() { emission_at(scene, &hit, s.direction) } else { Vec3::ZERO };
         let seen = if s.pdf > 0.0 { s.radiance * s.pdf } else { Vec3::ZERO };
         (seen - met).abs().max_element() > 1e-3
     };
     (0..10_000).into_par_iter().filter(differs).count() as f64 / 1e4
+}
+
+fn emission_at(scene: &Loaded, hit: &Hit, direction: Vec3) -> Vec3 {
+    let s = surface_at(scene, hit);
+    surface_emission(scene, &s, s.geometric.dot(direction).abs())
+}
+
+/// KHR_materials_clearcoat: what emits is seen through the coat, 1 - .04 - .96 (1 - c)^5 of it, whoever finds it.
+#[test]
+fn a_clear_coat_dims_the_lamp_below_it() {
+    for shape in ["shape = 'rectangle'\ntransform = { scale = 2.0 }", "shape = 'sphere'"] {
+        let scene = Workplace::new().picture("half.png", 2, |_, _| [188; 3]).scene(&format!(
+            "[[material]]\nname = 'lamp'\ntype = 'metallic-roughness'\nemission = 2.0\nclearcoat = 1.0\nclearcoat_roughness = 0.3\n\
+             [[mesh]]\n{shape}\nmaterial = 'lamp'\n"
+        ));
+        let mut steep = 0;
+        for i in 0..2000 {
+            let mut random = Random::stream(i);
+            let p = vec3(0.0, 0.0, 2.0) + 1.8 * random.point() * vec3(1.0, 1.0, 0.4);
+            let word = (random.unit() * 4_294_967_296.0) as u32;
+            let s = light_sample(&scene, &Receiver::point(p), word, vec2(random.unit(), random.unit()));
+            let hit = closest(&scene, p, s.direction);
+            if s.pdf == 0.0 || !hit.any() {
+                continue;
+            }
+            let cosine = surface_at(&scene, &hit).geometric.dot(s.direction).abs();
+            let expected = 2.0 * (1.0 - 0.04 - 0.96 * (1.0 - cosine).powi(5));
+            let [sampled, met] = [s.radiance.x * s.pdf, emission_at(&scene, &hit, s.direction).x];
+            // Rounding moves the direction by a little.
+            assert!(
+                (sampled - expected).abs() < 0.01 && (met - expected).abs() < 0.01,
+                "{cosine}: {sampled} {met} {expected}"
+            );
+            steep += u32::from(cosine < 0.4);
+        }
+        assert!(steep > 10, "control: {steep} are seen from the side");
+    }
 }
 
 #[test]

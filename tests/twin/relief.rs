@@ -44,14 +44,39 @@ fn relief_follows_the_picture() {
     }
 }
 
+/// Which set of coordinates the map of the surface reads, and which that of its clear coat.
+fn of_sets(own: u32, coat: u32) -> MaterialTable {
+    let table = |uv| Some(TextureTable { uv, ..texture("bumps").unwrap() });
+    MaterialTable { normal_map: table(own), clearcoat_normal_map: table(coat), ..material(0.0, [1.0; 2]) }
+}
+
 #[test]
-fn kernels_agree_about_relief_that_is_turned() {
+fn each_relief_lies_as_its_own_coordinates_do() {
+    let mesh = || Mesh { tangents: Vec::new(), ..patch() };
+    let swapped = || Mesh { uvs: mesh().uvs2, uvs2: mesh().uvs, ..mesh() };
+    let scene = |material, mesh| one(material, mesh, Transform::default(), false);
+    for (own, coat) in [(0, 1), (1, 0)] {
+        let apart = scene(of_sets(own, coat), mesh());
+        for (x, y) in [(0.3, -0.4), (-0.7, 0.1)] {
+            let both = surface(&apart, x, y);
+            let alone = |uv| surface(&scene(of_sets(0, 0), if uv == 0 { mesh() } else { swapped() }), x, y);
+            let normals = [(both.normal, alone(own).normal), (both.coat_normal, alone(coat).coat_normal)];
+            for (got, want) in normals {
+                assert!((got - want).length() < 1e-6, "sets {own} and {coat} at {x}, {y}: {got}, not {want}");
+            }
+        }
+    }
+}
+
+#[test]
+fn kernels_agree_about_relief_that_is_turned_and_of_two_sets() {
     let gpu = gpu();
-    let mesh = Mesh { tangents: Vec::new(), ..patch() };
-    let mut loaded =
-        Loaded { scene: one(material(30.0, [-2.0, 0.5]), mesh, Transform::default(), false), ..Loaded::default() };
-    small(&mut loaded.settings);
-    let effects = called_for(&loaded, &loaded.settings, Outputs::FILTERED);
-    check("turned relief", &run(&gpu, &loaded, effects));
+    for (what, material) in [("turned relief", material(30.0, [-2.0, 0.5])), ("relief of two sets", of_sets(0, 1))] {
+        let mesh = Mesh { tangents: Vec::new(), ..patch() };
+        let mut loaded = Loaded { scene: one(material, mesh, Transform::default(), false), ..Loaded::default() };
+        small(&mut loaded.settings);
+        let effects = called_for(&loaded, &loaded.settings, Outputs::FILTERED);
+        check(what, &run(&gpu, &loaded, effects));
+    }
     assert_silent(&gpu);
 }

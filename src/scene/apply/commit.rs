@@ -1,13 +1,14 @@
 //! Puts into a scene's arrays what a pose makes of it.
 use super::next::{Next, NextCopies, NextMesh};
 use crate::error::Result;
-use crate::layout::{BvhNode, Instance, Light, Material, Shading};
+use crate::layout::{BvhNode, Instance, Material, Shading};
 use crate::scene::build::geometry::FLAT;
 use crate::scene::build::soft::{self, Placed};
 use crate::scene::build::{bvh, coat, hierarchy, lights};
 use crate::scene::change::numbers;
+use crate::scene::fingerprint::posed;
 use crate::scene::pose::Pose;
-use crate::scene::{Change, Deformed, Scene};
+use crate::scene::{Change, Deformed, Fingerprint, Scene};
 use std::ops::Range;
 
 /// Changes the scene.
@@ -19,6 +20,7 @@ pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
     if let Some(materials) = next.materials {
         wear(scene, materials, &mut change);
     }
+    let before = scene.bounds;
     let mut copies = next.copies;
     if let Some(copies) = &mut copies {
         next.meshes.into_iter().for_each(|mesh| deform(scene, mesh, &mut copies.all, pose.rebuild_above, &mut change));
@@ -42,8 +44,8 @@ pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
     if let Some(camera) = &pose.camera {
         (scene.view, change.camera) = (camera.clone(), true);
     }
-    // A camera without a position looks at where the scene reaches now.
-    change.camera |= change.instances && (scene.view.position.is_none() || scene.view.target.is_none());
+    // A camera without a position or a target looks at where the scene reaches now.
+    change.camera |= scene.view.frames_scene() && scene.bounds != before;
     identify(scene);
     Ok(change)
 }
@@ -149,20 +151,12 @@ fn put(scene: &mut Scene, index: usize, built: Vec<BvhNode>, copies: &mut [Insta
     old.start
 }
 
-/// Makes the fingerprint that of the scene as it was loaded and of all that can have changed since: the way here does not count.
+/// Makes the fingerprint that of the scene as it was loaded and, if that differs from then, of all that can have changed since: the way
+/// here does not count.
 fn identify(scene: &mut Scene) {
-    let (rig, mut content) = (&scene.rig, scene.rig.content.clone());
-    let mut copies: Vec<_> = scene.instances.clone();
-    for (&copy, instance) in rig.order.iter().zip(&scene.instances) {
-        let hidden = u32::from(rig.hidden.contains(&copy));
-        copies[copy as usize] = match hidden {
-            0 => Instance { root: rig.tree_of[copy as usize], ..*instance },
-            _ => Instance::default(),
-        };
+    scene.content = scene.rig.content.clone();
+    let now = posed(scene, Fingerprint::default());
+    if now != scene.rig.rest {
+        scene.content = posed(scene, scene.rig.content.clone());
     }
-    content.add(&copies);
-    content.add(&scene.materials.iter().map(|m| Material { coat_table: 0, ..*m }).collect::<Vec<Material>>());
-    content.add::<Light>(&rig.lights);
-    rig.trees.iter().filter_map(|t| t.soft.as_ref()).for_each(|soft| content.add(soft.pose.as_bytes()));
-    scene.content = content;
 }

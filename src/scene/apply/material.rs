@@ -1,9 +1,10 @@
 //! New numbers of a material, with the ranges that its table has.
-use crate::layout::{BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_MASKED, Material};
+use crate::layout::{BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_MASKED, MATERIAL_UNLIT, Material};
 use crate::scene::load::material::{is_masked, mark_clear_wall, radiance, reflectance, within};
+use crate::scene::load::metallic::reflected_head_on;
 use crate::scene::pose::MaterialChange;
 
-/// The material with these numbers. Colours are clamped to [0, 1], since curves may overshoot.
+/// The material with these numbers. Reflectances are clamped to [0, 1], since curves may overshoot.
 ///
 /// # Errors
 /// A sentence that names the number at fault.
@@ -14,11 +15,15 @@ pub fn changed(m: &Material, to: &MaterialChange) -> Result<Material, String> {
         match m.kind {
             BSDF_DIELECTRIC => return Err("a dielectric has no color: change specular or transmission".to_owned()),
             BSDF_CONDUCTOR => m.specular = tint(color, "color")?,
+            _ if m.flags & MATERIAL_UNLIT != 0 => m.emission = tint(color, "color")?,
             _ => m.base_color = tint(color, "color")?,
         }
     }
     if let Some(specular) = to.specular {
-        m.specular = tint(specular, "specular")?;
+        m.specular = match m.kind {
+            BSDF_METALLIC => reflected_head_on(specular, m.eta[0])?,
+            _ => tint(specular, "specular")?,
+        };
     }
     if let Some(transmission) = to.transmission {
         m.transmission = tint(transmission, "transmission")?;

@@ -192,7 +192,7 @@ fn spheres_shine(scene: &Scene, copy: u32, at: &Instance, materials: &[Material]
     scene.triangles[tree.range.clone()].iter().try_for_each(|t| sphere_shines(t, even, &materials[worn(t) as usize]))
 }
 
-/// Lamps are sampled where they are hit: a sphere as one of even radiance that shines outward.
+/// Lamps are sampled where they are hit: a sphere as one of even radiance, below an even coat, that shines outward.
 fn sphere_shines(triangle: &Triangle, even: bool, worn: &Material) -> Checked {
     if triangle.primitive & SPHERE == 0 || worn.emission == [0.0; 3] {
         return Ok(());
@@ -201,6 +201,7 @@ fn sphere_shines(triangle: &Triangle, even: bool, worn: &Material) -> Checked {
         () if !even => "is stretched",
         () if triangle.primitive & SPHERE_INWARD != 0 => "shines inward",
         () if worn.emission_texture != NONE => "shines by a texture",
+        () if worn.clearcoat_texture != NONE => "has a clear coat by a texture",
         () if worn.flags & MATERIAL_MASKED != 0 => "is not opaque",
         () => return Ok(()),
     };

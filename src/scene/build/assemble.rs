@@ -16,6 +16,7 @@ use crate::layout::*;
 use crate::memory;
 use crate::scene::Scene;
 use crate::scene::description::Description;
+use crate::scene::fingerprint::{Fingerprint, posed};
 use crate::scene::load::library::Library;
 use crate::scene::load::material::{is_smooth_wall, mark_clear_wall};
 use glam::{DMat3, Vec3};
@@ -53,6 +54,8 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     );
     let placed = placed?;
     let decoded = sources.library.materials.textures.decode_after(decoded?)?;
+    let clipped = sources.library.materials.textures.clipped(&decoded);
+    sources.library.warnings.extend(clipped);
     (scene.textures, scene.texels) = (decoded.textures, decoded.texels);
     let attributes = match placed {
         Some(attributes) => attributes,
@@ -87,6 +90,7 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     scene.warnings = warnings;
     scene.rig.name(description, &scene.materials);
     scene.rig.content = scene.content.clone();
+    scene.rig.rest = posed(scene, Fingerprint::default());
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! Decides for each mesh whether it is baked into world space or stored in its own space for instances.
 use super::sources::{Sources, mesh_name};
 use crate::error::Result;
-use crate::layout::{MATERIAL_MASKED, NONE};
+use crate::layout::{MATERIAL_MASKED, MATERIAL_UNLIT, NONE};
 use crate::scene::description::shape::Shape;
 use crate::scene::description::{self, Description, InstanceTable, Key, MeshTable, Numbers, Transform, affine};
 use crate::scene::load::material::Materials;
@@ -105,8 +105,11 @@ impl<'s, 'a> Planner<'s, 'a> {
         let (sources, meshes) = (self.sources, &self.sources.description.mesh);
         let Some(&mesh) = self.named.get(table.mesh.as_str()) else {
             let names = meshes.iter().filter_map(|m| m.name.as_deref());
-            let near = description::nearest(&table.mesh, names).unwrap_or("(none has a name)");
-            return Err(sources.at(place, format!("no such mesh: did you mean \"{near}\"?")));
+            let what = match description::nearest(&table.mesh, names) {
+                Some(near) => format!("no such mesh: did you mean \"{near}\"?"),
+                None => format!("no such mesh, since none has a name: write name = \"{}\" in its table", table.mesh),
+            };
+            return Err(sources.at(place, what));
         };
         self.instanced[mesh] = true;
         let affine = invertible(sources, table.transform, place)?;
@@ -156,9 +159,11 @@ fn may_be_exact(sources: &Sources, job: &Job) -> Result<bool> {
         let tables = sources.description.animation.iter().filter(|t| t.material.as_ref() == Some(name));
         tables.flat_map(|t| &t.keys).any(|k| k.values.contains_key(key))
     };
-    let lamp = m.emission != [0.0; 3] || keyed("emission");
+    let unlit = m.flags & MATERIAL_UNLIT != 0;
+    let lamp = m.emission != [0.0; 3] || keyed("emission") || unlit && keyed("color");
     let opaque = m.flags & MATERIAL_MASKED == 0 && !keyed("opacity");
-    let even = m.emission_texture == NONE && opaque && is_even(&job.affine) && !is_stretched(sources.description, job);
+    let plain = m.emission_texture == NONE && m.clearcoat_texture == NONE;
+    let even = plain && opaque && is_even(&job.affine) && !is_stretched(sources.description, job);
     Ok(is_sphere(table) && (!lamp || even && !table.flip_normals))
 }
 

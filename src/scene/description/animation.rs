@@ -31,7 +31,8 @@ pub struct AnimationTable {
     pub node: Option<String>,
     /// Name of the `[[light]]` that it changes: `position`, `direction`, `target`, `intensity`, `irradiance`, `cone`, `cutoff`.
     pub light: Option<String>,
-    /// Name of the material that it changes: `color`, `specular`, `transmission`, `emission`, `alpha`, `opacity`.
+    /// Name of the material that it changes: `color`, `specular`, `transmission`, `emission` (with its strength in it), `alpha`
+    /// (`alpha_v` keeps its ratio to it), `opacity`.
     pub material: Option<String>,
     /// Whether it changes the environment: `radiance` (with an image, its factor) and `rotation` in degrees.
     pub environment: bool,

@@ -90,6 +90,12 @@ impl Camera {
         })
     }
 
+    /// Whether where it stands or looks depends on what the scene reaches.
+    pub fn frames_scene(&self) -> bool {
+        let stands = self.position.is_some() && self.target.is_some();
+        self.world_from_camera.is_none() && self.framed.is_none() && !stands
+    }
+
     /// Half of the film's width and height: at distance 1, or anywhere if rays are parallel.
     fn half_film(&self, [width, height]: [u32; 2]) -> Result<(f64, f64), String> {
         let half = self.half_edge()?;

@@ -81,7 +81,7 @@ pub struct MaterialTable {
     /// Name of the metal that gives a conductor's `eta` and `k`.
     pub metal: Option<String>,
     /// Interior over exterior index of a dielectric, a coat or the dielectric part of metallic-roughness, from 0.1 to
-    /// 10 (metallic-roughness: to 1000); default 1.5.
+    /// 10 (metallic-roughness: to 1000, or 0, with which the dielectric reflects all that `specular` says); default 1.5.
     pub ior: Option<f32>,
     /// Tint of specular reflection; default 1. Metallic-roughness: from 0 to 1e6.
     pub specular: Option<Rgb>,

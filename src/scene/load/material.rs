@@ -25,9 +25,11 @@ pub struct Materials {
     pub take_vertex_alpha: Vec<u32>,
 }
 
-/// Marks smooth thin walls without a coat, which shadow rays of lights without extent pass.
+/// Marks thin walls without a coat that are smooth, or whose picture may make them so: shadow rays of lights without extent pass
+/// where they are.
 pub fn mark_clear_wall(m: &mut Material) {
-    let clear = is_smooth_wall(m) && m.clearcoat == 0.0;
+    let pictured = m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.roughness_texture != NONE;
+    let clear = (is_smooth_wall(m) || pictured) && m.clearcoat == 0.0;
     m.flags = m.flags & !MATERIAL_CLEAR_WALL | if clear { MATERIAL_CLEAR_WALL } else { 0 };
 }
 

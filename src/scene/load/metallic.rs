@@ -69,16 +69,12 @@ impl Materials {
         m.metallic = unit(t.metallic, 1.0, "metallic")?;
         m.alpha = unit(t.roughness, 1.0, "roughness")?.powi(2);
         m.roughness_texture = self.texture(s, &t.metallic_roughness_texture, Kind::Data)?;
-        // Kernels limit the reflectance head on, ((ior - 1) / (ior + 1))^2 times `specular`, to 1.
         let ior = t.ior.unwrap_or(1.5);
-        if !(0.1..=1000.0).contains(&ior) {
-            return Err(format!("ior is {ior}: choose a value from 0.1 to 1000"));
+        if !(ior == 0.0 || (0.1..=1000.0).contains(&ior)) {
+            return Err(format!("ior is {ior}: choose a value from 0.1 to 1000, or 0 for all to be reflected"));
         }
-        let color = t.specular.map_or([1.0; 3], |v| v.0);
-        if !color.iter().all(|v| (0.0..=1e6).contains(v)) {
-            return Err(format!("specular {color:?} is negative, NaN or above 1e6"));
-        }
-        m.specular = color.map(|v| v * ((ior - 1.0) / (ior + 1.0)).powi(2));
+        m.eta = [ior; 3];
+        m.specular = reflected_head_on(t.specular.map_or([1.0; 3], |v| v.0), ior)?;
         m.specular_texture = self.texture(s, &t.specular_texture, Kind::Color)?;
         m.specular_factor = unit(t.specular_factor, 1.0, "specular_factor")?;
         m.specular_factor_texture = self.texture(s, &t.specular_factor_texture, Kind::Alpha)?;
@@ -114,6 +110,18 @@ impl Materials {
             (None, None) => NONE,
         };
         Ok(t.alpha_mode.is_some())
+    }
+}
+
+/// Of a dielectric with this `specular` of its table: ((ior - 1) / (ior + 1))^2 of it, which kernels limit to 1. An index of 0 reflects
+/// all, as KHR_materials_ior has it.
+///
+/// # Errors
+/// For a colour that is out of range.
+pub fn reflected_head_on(specular: [f32; 3], ior: f32) -> Result<[f32; 3], String> {
+    match specular.iter().all(|v| (0.0..=1e6).contains(v)) {
+        true => Ok(specular.map(|v| v * ((ior - 1.0) / (ior + 1.0)).powi(2))),
+        false => Err(format!("specular {specular:?} is negative, NaN or above 1e6")),
     }
 }
 

@@ -201,6 +201,24 @@ impl TextureSet {
         Ok(Decoded { pictures, textures, texels })
     }
 
+    /// A warning for every picture of emission with colours that the form of its texels cannot hold.
+    pub fn clipped(&self, decoded: &Decoded) -> Vec<String> {
+        let lamps = self.pictures.iter().zip(&decoded.pictures);
+        let lamps = lamps.filter(|((_, kind), t)| *kind == Kind::Light && t.flags & TEXTURE_RGB9E5 != 0);
+        let warning = |((path, _), texture): (&(PathBuf, Kind), &Texture)| {
+            let clipped = own_texels(texture, &decoded.texels).iter().filter(|word| rgb9e5::is_largest(**word)).count();
+            let place = path.display();
+            (clipped > 0).then(|| {
+                format!(
+                    "texture {place}: clamped to {:e}, the brightest that a picture of emission holds, in {clipped} texels: \
+                     scale the picture down, and its emission up",
+                    rgb9e5::LARGEST
+                )
+            })
+        };
+        lamps.filter_map(warning).collect()
+    }
+
     fn source(&self, path: &Path) -> Result<Source> {
         match self.bitmaps.get(path) {
             Some(bitmap) => Ok(Source::Bitmap(bitmap.clone())),

@@ -164,9 +164,8 @@ impl Reader<'_> {
             *emission = self.within("emissiveStrength", strong, MAX_RADIANCE);
         }
         if let Some(found) = self.extension::<Ior>(all, "KHR_materials_ior")? {
-            // 0 stands for an index that reflects everything, which no finite index does.
             let [ior] = self.between("ior", [found.ior], [1.0, LARGEST_INDEX]);
-            table.ior = Some(if found.ior == 0.0 { LARGEST_IOR } else { ior });
+            table.ior = Some(if found.ior == 0.0 { 0.0 } else { ior });
         }
         if let Some(found) = self.extension::<Specular>(all, "KHR_materials_specular")? {
             table.specular_factor = Some(self.unit("specularFactor", found.specular_factor));
@@ -218,9 +217,6 @@ impl Reader<'_> {
         extension::read(self.asset, Some(all), name, &self.place)
     }
 }
-
-/// Reflects 98 % head on.
-const LARGEST_IOR: f32 = 200.0;
 
 fn plain(info: &Info) -> TextureInfo {
     let extensions = info.extensions.as_ref().map_or_else(Map::new, |e| e.others.clone());
