@@ -235,6 +235,12 @@ fn mistakes_are_one_line_with_the_table_and_the_key() {
         (instance("{ time = 0, translat = [0, 0, 0] }"), "unknown key \"translat\": choose from translate, rotate"),
         (instance("{ time = 0, translate = [0, 0] }"), "translate has 2 numbers, not 3"),
         (instance("{ time = 0, scale = 1, transform = [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1] }"), "choose"),
+        (
+            instance(
+                "{ time = 0, translate = [1,0,0] }, { time = 1, transform = [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1] }",
+            ),
+            "has a transform and parts of one: choose",
+        ),
         (instance(""), "has no keys"),
         (instance("{ time = 0, rotate = [0, 0, 0, 9] }"), "the axis of rotate is zero"),
         ("[[animation]]\ninstance = \"bux\"\nkeys = [{ time = 0, scale = 1 }]".into(), "did you mean \"box\"?"),

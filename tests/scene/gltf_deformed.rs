@@ -51,6 +51,14 @@ fn joints_turn_normals_and_tangents() {
     json["scenes"][0]["nodes"] = json!([0, 1, 2]);
     let turned_normals = [vec3(0.0, 0.3, 0.8), vec3(-0.6, 0.0, 0.8), Vec3::Z];
     check(&json, turned_normals, [vec3(0.0, 1.6, -0.6), Vec3::Y, Vec3::NEG_X], 1.0);
+    // Joints alone say where it is.
+    json["nodes"][0]["scale"] = json!([0, 0, 0]);
+    let scene = load(&json);
+    assert!(
+        !scene.triangles.is_empty() && !scene.warnings.iter().any(|w| w.contains("scale is 0")),
+        "{:?}",
+        scene.warnings
+    );
 }
 
 #[test]

@@ -2,6 +2,7 @@
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::Path;
+use tallow::image::{Film, WriteOptions, write};
 use tallow::layout::*;
 use tallow::scene::{Loaded, Scene, effects};
 use tallow::twins::texture::texture_sample;
@@ -351,6 +352,21 @@ fn what_is_legal_but_odd_is_a_warning() {
 }
 
 #[test]
+fn pictures_of_emission_too_bright_for_their_texels_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let warnings = |brightest: f32| {
+        let mut film = Film::new(2, 1);
+        film.add_vec3("", ["R", "G", "B"], &[[brightest, 1.0, 1.0], [1.0, 2.0, brightest]]);
+        write(&folder.path().join("lamp.exr"), &film, &WriteOptions::default()).unwrap();
+        let text = "[[material]]\nname = 'lamp'\nemission_texture = 'lamp.exr'\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n";
+        Scene::parse(&folder.path().join("scene.toml"), text).unwrap().scene.warnings
+    };
+    assert_eq!(warnings(60_000.0), Vec::<String>::new());
+    let said = warnings(200_000.0);
+    assert!(said.len() == 1 && said[0].contains("lamp.exr: clamped to 6.5408e4"), "{said:?}");
+}
+
+#[test]
 fn lamps_that_lie_on_others_are_told() {
     let lamp = |name: &str, emission: u32| format!("[[material]]\nname = '{name}'\nemission = {emission}\n");
     let placed =
@@ -423,13 +439,21 @@ fn mtl_rules_by_example() {
         ("glass", "Kd 0 0 0\nTf 0.9 1 0.9\nNi 1.33\nillum 7\nd 0.3"),
         ("tinted", "Kd 1 1 1\nTf 1 0 0\nNi 1.4\nd 0.5"),
         ("veil", "Kd 1 1 1\nd 0.5"),
+        // As Maya and Blender write what does not refract.
+        ("lambert", "illum 4\nKd 0.5 0.5 0.5\nKa 0 0 0\nTf 1 1 1\nNi 1.00"),
+        ("no index", "illum 4\nKd 0.5 0.5 0.5\nTf 1 1 1\nNi 0.00"),
+        ("blinn", "illum 4\nKd 0.5 0.5 0.5\nTf 1 1 1\nKs 0.5 0.5 0.5\nNs 18\nNi 1.00"),
+        ("alpha", "Ns 250\nKd 0.8 0.1 0.1\nKs 0 0 0\nNi 1.45\nd 0.5\nillum 9"),
     ];
     let mtl: String = blocks.iter().map(|(name, text)| format!("newmtl {name}\n{text}\n")).collect();
     let faces: String = blocks.iter().map(|(name, _)| format!("usemtl {name}\nf 1 2 3\n")).collect();
     std::fs::write(dir.path().join("m.mtl"), mtl).unwrap();
     std::fs::write(dir.path().join("m.obj"), format!("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}")).unwrap();
     let scene = Scene::load(&dir.path().join("m.obj")).unwrap();
-    let [diffuse, coated, metal, mirror, glass, tinted, veil] = scene.materials[..] else { panic!("seven materials") };
+    let [diffuse, coated, metal, mirror, glass, tinted, veil, lambert, no_index, blinn, alpha] = scene.materials[..]
+    else {
+        panic!("eleven materials")
+    };
     assert_eq!((diffuse.kind, diffuse.base_color), (BSDF_DIFFUSE, [0.5, 0.4, 0.3]));
     assert_eq!((coated.kind, coated.eta[0]), (BSDF_COATED, 1.5));
     assert!((coated.alpha - 0.1).abs() < 1e-6 && (coated.specular[0] - 1.0).abs() < 1e-4);
@@ -443,6 +467,9 @@ fn mtl_rules_by_example() {
     assert_eq!((glass.transmission, glass.flags & MATERIAL_MASKED), ([0.9, 1.0, 0.9], 0));
     assert_eq!((tinted.kind, tinted.transmission), (BSDF_DIELECTRIC, [1.0, 0.0, 0.0]));
     assert_eq!((veil.kind, veil.opacity, veil.flags & MATERIAL_MASKED), (BSDF_DIFFUSE, 0.5, MATERIAL_MASKED));
+    assert_eq!((lambert.kind, lambert.base_color), (BSDF_DIFFUSE, [0.5; 3]));
+    assert_eq!((no_index.kind, blinn.kind, blinn.eta[0]), (BSDF_DIFFUSE, BSDF_COATED, 1.5));
+    assert_eq!((alpha.kind, alpha.base_color, alpha.opacity), (BSDF_DIFFUSE, [0.8, 0.1, 0.1], 0.5));
 }
 
 #[test]

@@ -134,6 +134,10 @@ fn curves(table: &AnimationTable, target: &Target) -> Checked<Vec<(&'static str,
     for (number, key) in (1..).zip(&table.keys) {
         check(key, target).map_err(|what| format!("key {number}, at {}: {what}", key.time))?;
     }
+    let says = |name: &&str| table.keys.iter().any(|key| key.values.contains_key(*name));
+    if says(&"transform") && ["translate", "rotate", "scale"].iter().any(says) {
+        return Err("has a transform and parts of one: choose".to_owned());
+    }
     let mut curves = Vec::new();
     for &(name, counts) in target.channels() {
         let of = |key: &Key| Some((key.time, widened(key.values.get(name)?.list(), counts)));
@@ -198,10 +202,7 @@ fn check(key: &Key, target: &Target) -> Checked {
             return Err("the last row of transform is not 0 0 0 1".to_owned());
         }
     }
-    let [moves, turns, scales] = ["translate", "rotate", "scale"].map(|name| key.values.contains_key(name));
-    if (moves || turns || scales) && key.values.contains_key("transform") {
-        return Err("has a transform and parts of one: choose".to_owned());
-    }
+    let [turns, scales] = ["rotate", "scale"].map(|name| key.values.contains_key(name));
     let sheared = matches!(target, Target::Placement(_, rest) if rest.steps().is_none());
     match sheared && turns != scales {
         true => Err("its table's transform has shear, which has no rotate or scale to keep: give both".to_owned()),

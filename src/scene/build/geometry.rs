@@ -1,5 +1,5 @@
 //! The growing triangle arrays: placement, repair of what can be repaired, packing of normals.
-use super::attributes::Extras;
+use super::attributes::{Extras, words_of};
 use super::encode::encode_normal;
 use crate::layout::{NONE, SPHERE, SPHERE_INWARD, SPHERE_MIRRORED, Shading, Triangle};
 use crate::scene::MAX_COORDINATE;
@@ -183,14 +183,21 @@ impl Geometry {
         self.shading.resize(self.triangles.len(), plain());
     }
 
+    /// What is stored of a triangle's vertices apart.
+    fn words(&self, s: &Shading) -> &[u32] {
+        &self.attributes[s.first as usize..][..words_of(s.attributes) as usize]
+    }
+
     /// Drops triangles from `start` on that equal an earlier one of them in all but number and object; returns how many.
     /// A duplicate lamp would be sampled twice as often as rays hit it.
     pub fn drop_copies(&mut self, start: usize) -> usize {
-        let shading = |i: usize| self.shading.get(i).map(|s| Shading { first: 0, ..*s });
+        let shading = |i: usize| self.shading.get(i).map(|s| (Shading { first: 0, ..*s }, self.words(s)));
         let all = |i: usize| (Triangle { primitive: 0, object: 0, ..self.triangles[i] }, shading(i));
         let hash = |i: usize| {
             let (triangle, shading) = all(start + i);
-            let seed = shading.map_or(0, |s| xxh3_64(bytemuck::bytes_of(&s)));
+            let seed = shading.map_or(0, |(s, words)| {
+                xxh3_64_with_seed(bytemuck::bytes_of(&s), xxh3_64(bytemuck::cast_slice(words)))
+            });
             xxh3_64_with_seed(bytemuck::bytes_of(&triangle), seed)
         };
         let keep = firsts(self.triangles.len() - start, hash, |i| all(start + i));

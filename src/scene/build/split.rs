@@ -7,7 +7,7 @@ use super::brightness::{luminance_at, mean_luminance, points, texels};
 use super::geometry::Corners;
 use crate::layout::{Material, NONE, TEXTURE_SECOND_UV};
 use crate::scene::Scene;
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DAffine3, Vec2, Vec3, Vec4};
 use std::borrow::Cow;
 use std::ops::{Add, Mul};
 use std::slice;
@@ -66,12 +66,14 @@ impl Lamps<'_> {
         self.materials.get(material as usize).filter(|m| is_pictured(m))
     }
 
-    /// A triangle, or its parts where its picture shines unevenly: quartered up to `depth` times.
-    pub fn split<'c>(&self, c: &'c Corners, material: u32, depth: u32) -> Cow<'c, [Corners]> {
+    /// A triangle, or its parts where its picture shines unevenly: quartered up to `depth` times, as far as there is room where `placed`
+    /// puts it.
+    pub fn split<'c>(&self, c: &'c Corners, material: u32, depth: u32, placed: &DAffine3) -> Cow<'c, [Corners]> {
         let whole = Cow::Borrowed(slice::from_ref(c));
         let Some(m) = self.pictured(material).filter(|_| depth > 0) else { return whole };
         let texels = texels(self.scene, m, |image| self.coordinates(c, image)) / LEAST_TEXELS;
-        let depth = depth.min(depth_for(texels)).min(depth_for(room(c.p).powi(2)));
+        let corners = c.p.map(|p| placed.transform_point3(p.as_dvec3()).as_vec3());
+        let depth = depth.min(depth_for(texels)).min(depth_for(room(corners).powi(2)));
         let tolerance = TOLERANCE * mean_luminance(self.scene, m) / 4f64.powi(depth as i32);
         let Part { parts, .. } = self.parts(&prepared(c), m, depth, tolerance);
         if parts.len() == 1 { whole } else { parts.into() }
@@ -151,7 +153,7 @@ mod tests {
     use crate::layout::{TEXTURE_RGB9E5, Texture};
     use crate::math::rgb9e5;
     use crate::scene::build::brightness::read_pictures;
-    use glam::{vec2, vec3};
+    use glam::{DVec3, vec2, vec3};
 
     const EDGE: u32 = 16;
     /// Of half a sheet, whose picture is `EDGE` texels wide.
@@ -163,13 +165,20 @@ mod tests {
     };
 
     fn split(value: impl Fn(u32, u32) -> f32, depth: u32) -> Vec<Corners> {
+        split_at(0.0, value, depth)
+    }
+
+    /// So far away along each axis.
+    fn split_at(far: f64, value: impl Fn(u32, u32) -> f32, depth: u32) -> Vec<Corners> {
         let texels = (0..EDGE * EDGE).map(|i| rgb9e5::pack([value(i % EDGE, i / EDGE); 3])).collect();
         let flags = TEXTURE_RGB9E5;
         let picture = Texture { width: EDGE, height: EDGE, scale: [1.0; 2], flags, ..Texture::default() };
         let mut scene = Scene { textures: vec![picture], texels, ..Scene::default() };
         let materials = [Material { emission: [5.0; 3], emission_texture: 0, ..Material::default() }];
         read_pictures(&materials, &mut scene);
-        Lamps { scene: &scene, materials: &materials }.split(&HALF, 0, depth).into_owned()
+        Lamps { scene: &scene, materials: &materials }
+            .split(&HALF, 0, depth, &DAffine3::from_translation(DVec3::splat(far)))
+            .into_owned()
     }
 
     fn area(c: &Corners) -> f64 {
@@ -208,6 +217,8 @@ mod tests {
         assert_eq!(depth_for(f32::NAN), 0);
         let far = HALF.p.map(|p| p + 1e4);
         assert!(room(far) < 1.0 && room(HALF.p) > 500.0);
+        assert_eq!(split_at(1e4, patch, 6).len(), 1, "where it is placed there is no room");
+        assert!(split_at(100.0, patch, 6).len() > 4, "control");
     }
 
     #[test]

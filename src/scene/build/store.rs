@@ -54,6 +54,8 @@ pub fn store(sources: &mut Sources, plan: &Plan, scene: &Scene, geometry: &mut G
     let lamps = Lamps { scene, materials: &materials };
     let counts = jobs.iter().map(|job| lamps_of(sources, plan, job, lamps)).collect::<Result<Vec<_>>>()?;
     let depths = split::depths(&counts);
+    // At once: each of many small meshes would move all before it.
+    memory::reserve(sources.path.display(), &mut geometry.triangles, triangles as usize)?;
     let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new(), soft: None }];
     for (i, job) in jobs.into_iter().enumerate() {
         let start = geometry.triangles.len();
@@ -191,9 +193,8 @@ impl<'a, 'l> Addition<'a, 'l> {
         let file = self.take_file(sources);
         self.check_group(sources, &file)?;
         let before = geometry.triangles.len();
-        let more = if self.job.exact { 1 } else { triangles(self.table, Some(&file)) as usize };
-        memory::reserve(&self.place, &mut geometry.triangles, more)?;
         if !geometry.shading.is_empty() {
+            let more = geometry.triangles.capacity() - geometry.shading.len();
             memory::reserve(&self.place, &mut geometry.shading, more)?;
         }
         let mut repairs = Repairs::default();
@@ -327,7 +328,7 @@ impl<'a, 'l> Addition<'a, 'l> {
                 extras,
             };
             let (tag, (lamps, depth)) = (Tag { primitive: first.primitive + t, ..first }, self.lamps);
-            for (part, c) in lamps.split(&c, tag.material, depth).iter().enumerate() {
+            for (part, c) in lamps.split(&c, tag.material, depth, &self.placement.affine).iter().enumerate() {
                 let mut again = Repairs::default(); // what is wrong is counted once
                 let repairs = if part == 0 { &mut repairs } else { &mut again };
                 geometry.push(c, tag, &self.placement, repairs)?;

@@ -87,7 +87,8 @@ pub struct EnvironmentTable {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshTable {
-    /// Name for instances and reports; default the file's or the shape's.
+    /// Name by which instances and animations call it, which they cannot without, but for a glTF file's own; reports take the file's or
+    /// the shape's then.
     pub name: Option<String>,
     /// Path of an OBJ file, of a PLY file (`.ply`, `.ply.gz`), or of a glTF file, whose meshes, lights and what moves them take the
     /// place of this table.

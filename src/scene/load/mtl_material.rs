@@ -3,7 +3,8 @@
 //!    mirror, since indices cannot be textured.
 //! 2. `illum` 3 or 5 with black Kd and no map_Kd: a mirror tinted by Ks (white where Ks is black).
 //! 3. `illum` 4, 6, 7 or 9 without map_d, or d below 1 together with Tf and Ni above 1: a dielectric of index Ni
-//!    (1.5 where absent), its transmission tinted by Tf.
+//!    (1.5 where absent), its transmission tinted by Tf. It is none where Ni is 0 or 1, which Maya writes of what is opaque, nor for
+//!    `illum` 6 or 9 with d below 1 and no Tf, as Blender writes an alpha.
 //! 4. Ks above black and `illum` other than 0 and 1: a diffuse base Kd under a coat of index Ni (1.5 where it is not
 //!    above 1). Ks is the coat's reflectance at normal incidence, capped at what the index gives.
 //! 5. Otherwise diffuse.
@@ -112,10 +113,12 @@ fn mtl_kind(mtl: &Mtl, kd: [f32; 3], ks: [f32; 3], d: f32) -> Type {
     let (block, masked) = (&mtl.block, mtl.block.dissolve_texture.is_some());
     let black = kd == [0.0; 3] && block.diffuse_texture.is_none();
     let tinted_glass = d < 1.0 && mtl.tf().is_some() && block.optical_density.is_some_and(|n| n > 1.0);
+    let refracts = block.optical_density.is_none_or(|n| n != 0.0 && n != 1.0);
+    let is_alpha = matches!(block.illumination_model, Some(6 | 9)) && d < 1.0 && mtl.tf().is_none();
     match block.illumination_model.unwrap_or(2) {
         _ if mtl.number("Pm").is_some_and(|pm| pm >= 0.5) => Type::Conductor,
         3 | 5 if black => Type::Mirror,
-        4 | 6 | 7 | 9 if !masked => Type::Dielectric,
+        4 | 6 | 7 | 9 if !masked && refracts && !is_alpha => Type::Dielectric,
         _ if tinted_glass && !masked => Type::Dielectric,
         0 | 1 => Type::Diffuse,
         _ if ks != [0.0; 3] => Type::Coated,

@@ -13,11 +13,11 @@ use crate::math::srgb::linear_from_srgb;
 use crate::memory;
 use crate::scene::BYTES_OF_TRIANGLE;
 use crate::scene::description::mesh::Mesh;
-use flate2::read::GzDecoder;
+use flate2::read::MultiGzDecoder;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult};
 use std::borrow::Cow;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
 /// Bytes of a vertex, and of a face of three or four corners, as read and as a part of the mesh.
@@ -39,7 +39,7 @@ pub fn load(path: &Path, numbering: Numbering, library: &mut Library) -> Result<
     let warnings = &mut library.warnings;
     let mut read = || match packed {
         true => {
-            let unpacked = &mut BufReader::with_capacity(1 << 18, GzDecoder::new(&mut file));
+            let unpacked = &mut BufReader::with_capacity(1 << 18, MultiGzDecoder::new(&mut file));
             parse(path, unpacked, size.saturating_mul(DEFLATE), numbering, warnings)
         }
         false => parse(path, &mut file, size, numbering, warnings),
@@ -64,8 +64,9 @@ fn parse(
     if !reader.fill_buf().is_ok_and(|head| head.starts_with(b"ply")) {
         return Err(Error::input(path, "is no PLY file"));
     }
-    let mut file = File { reader: Reader::new(reader), line: 0 };
     let about = |what| Error::input(path, what);
+    let mut whole = Cursor::new(head::read(reader).map_err(about)?).chain(reader);
+    let mut file = File { reader: Reader::new(&mut whole as &mut dyn BufRead), line: 0 };
     let header = Parser::<Vertex>::new().read_header(&mut file.reader).map_err(|e| about(damaged(&e)))?;
     file.line = file.reader.line();
     check(&header, size).map_err(about)?;
@@ -79,7 +80,12 @@ fn parse(
     let read = vertices * BYTES_OF_VERTEX + faces * BYTES_OF_FACE;
     // A face is a triangle or more, and what those need is known before minutes are spent on reading them.
     memory::need(format!("{}: {faces} faces", path.display()), read.max(faces * BYTES_OF_TRIANGLE))?;
-    file.mesh(&header, numbering).map_err(about)
+    let (mesh, dropped) = file.mesh(&header, numbering).map_err(about)?;
+    if dropped > 0 {
+        let place = path.display();
+        warnings.push(format!("{place}: faces repaired: {dropped} of fewer than three corners dropped"));
+    }
+    Ok(mesh)
 }
 
 /// Compares the header with the bytes that there can be: every property of an element takes at least one.
@@ -92,6 +98,13 @@ fn check(header: &Header, size: u64) -> Checked {
         }
     }
     let Some(vertex) = header.elements.get("vertex") else { return Err("has no vertices: is it a mesh?".into()) };
+    if header
+        .elements
+        .get("face")
+        .is_some_and(|face| face.count > 0 && !face.properties.keys().any(|name| is_corners(name)))
+    {
+        return Err("its faces have no vertex_indices: save it again as PLY 1.0".into());
+    }
     let missing = ["x", "y", "z"].into_iter().find(|axis| !has(vertex, &[axis]));
     missing.map_or(Ok(()), |axis| Err(format!("its vertices have no {axis}")))
 }
@@ -128,7 +141,8 @@ impl File<'_> {
         }
     }
 
-    fn mesh(&mut self, header: &Header, numbering: Numbering) -> Checked<Mesh> {
+    /// The mesh, and how many faces have too few corners.
+    fn mesh(&mut self, header: &Header, numbering: Numbering) -> Checked<(Mesh, usize)> {
         let (mut mesh, mut faces, mut strips) = (Mesh::default(), Vec::<Face>::new(), Vec::<Face>::new());
         for (name, element) in &header.elements {
             match name.as_str() {
@@ -146,14 +160,14 @@ impl File<'_> {
             Numbering::Shared => (mesh, None),
             Numbering::Corners => (Mesh::default(), Some(mesh)),
         };
-        let mut faces_of = Faces { mesh, vertices_of, triangulator: Triangulator::default() };
+        let mut faces_of = Faces { mesh, vertices_of, triangulator: Triangulator::default(), dropped: 0 };
         for face in faces {
             faces_of.add(face.corners(vertices, &face.0)?);
         }
         for strip in strips {
             strip.triangles(vertices)?.into_iter().for_each(|triangle| faces_of.add(triangle.to_vec()));
         }
-        Ok(faces_of.mesh)
+        Ok((faces_of.mesh, faces_of.dropped))
     }
 }
 
@@ -163,11 +177,14 @@ struct Faces {
     /// Where each corner becomes a vertex: those of the file.
     vertices_of: Option<Mesh>,
     triangulator: Triangulator,
+    /// Faces of fewer than three corners.
+    dropped: usize,
 }
 
 impl Faces {
     fn add(&mut self, mut corners: Vec<u32>) {
         if corners.len() < 3 {
+            self.dropped += 1;
             return;
         }
         let mesh = &mut self.mesh;
@@ -310,6 +327,7 @@ impl PropertyAccess for Nothing {
     }
 }
 
+mod head;
 mod text;
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Placement, repair and packing of single triangles.
 use super::*;
+use glam::vec4;
 
 const PLAIN: Placement = Placement { affine: DAffine3::IDENTITY, flat: false, flip: false, uvs: true, keep: false };
 const TAG: Tag = Tag { primitive: 0, material: 0, object: 0 };
@@ -80,4 +81,11 @@ fn copies_are_dropped_and_what_differs_is_kept() {
     let left: Vec<_> = g.triangles.iter().map(|t| t.primitive).collect();
     assert_eq!((left, g.shading.len()), (vec![0, 2, 3, 4], 4));
     assert_eq!((g.shading[1].normal, g.shading[2].normal == FLAT), (FLAT, false));
+    let (mut g, mut r) = <(Geometry, Repairs)>::default();
+    for (primitive, alpha) in (0..).zip([0.0, 1.0, 0.0]) {
+        let extras = Extras { colors: Some([vec4(1.0, 0.5, 0.0, alpha); 3]), ..Extras::default() };
+        g.push(&Corners { extras, ..plain }, Tag { primitive, ..TAG }, &PLAIN, &mut r).unwrap();
+    }
+    assert_eq!(g.drop_copies(0), 1, "one of another colour shows through, or hides the other");
+    assert_eq!(g.triangles.iter().map(|t| t.primitive).collect::<Vec<_>>(), [0, 1]);
 }

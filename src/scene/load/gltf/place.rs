@@ -124,7 +124,11 @@ impl<'a> Placer<'a> {
         let bends = |primitive: &Arc<Primitive>| {
             skin.is_some() && !primitive.joints.is_empty() || weighted && !primitive.targets.is_empty()
         };
+        let flat = self.flat;
         let copies = self.copies(node)?;
+        if skin.is_some() && self.meshes[&mesh].iter().all(|primitive| !primitive.joints.is_empty()) {
+            self.flat = flat; // joints alone say where it is
+        }
         if !self.meshes[&mesh].iter().any(bends) {
             self.placed.entry(mesh).or_default().extend(copies);
             return Ok(());

@@ -111,6 +111,7 @@ fn every_form_is_the_same_mesh() {
         (square(Form::Big), "a.ply"),
         (packed(&text), "a.ply.gz"),
         (packed(&square(Form::Big)), "a.ply.gz"),
+        ([packed(&text[..100]), packed(&text[100..])].concat(), "a.ply.gz"),
     ];
     for (i, (bytes, name)) in files.iter().enumerate() {
         let mesh = read(bytes, name).unwrap_or_else(|e| panic!("file {i}: {e}"));
@@ -121,6 +122,31 @@ fn every_form_is_the_same_mesh() {
         let [r, g, b, a] = mesh.colors[0];
         assert!(r == 1.0 && (g - 0.5).abs() < 0.01 && b == 0.0 && a == 1.0, "file {i}: {:?}", mesh.colors[0]);
         assert!(mesh.normals.is_empty(), "file {i}");
+    }
+}
+
+/// Whatever programs call what is not read, and however often, rows are as long as the header says.
+#[test]
+fn names_that_are_not_read_may_be_any() {
+    let others = ["scalar_Linearity_(0.5)", "Col.001", "#2", "quality", "quality", "x", "unread_3"];
+    let more: String = others.iter().map(|name| format!("property float {name}\n")).collect();
+    let header = format!(
+        "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n{more}\
+         element face 1\nproperty list uchar int vertex_indices\n"
+    );
+    let places = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let row = |p: &[f32; 3]| p.iter().copied().chain([9.0; 7]).collect::<Vec<f32>>();
+    let lines: String =
+        places.iter().map(|p| row(p).iter().map(|v| format!("{v} ")).collect::<String>() + "\n").collect();
+    let mut binary = format!("ply\nformat binary_little_endian 1.0\n{header}end_header\n").into_bytes();
+    places.iter().flat_map(row).for_each(|v| binary.extend(v.to_le_bytes()));
+    binary.push(3);
+    [0u32, 1, 2].iter().for_each(|i| binary.extend(i.to_le_bytes()));
+    let latin = text(&header, &format!("{lines}3 0 1 2\n")).replace("1.0\n", "1.0\ncomment Fl?che\n").into_bytes();
+    let latin = latin.into_iter().map(|b| if b == b'?' { 0xe4 } else { b }).collect::<Vec<u8>>();
+    for (bytes, what) in [(latin, "text"), (binary, "binary")] {
+        let mesh = read(&bytes, "a.ply").unwrap_or_else(|e| panic!("{what}: {e}"));
+        assert_eq!((mesh.positions, mesh.indices), (places.to_vec(), vec![0, 1, 2]), "{what}");
     }
 }
 
@@ -156,6 +182,11 @@ fn what_is_wrong_is_one_line() {
     assert!(refusal(text(&header.replace(" z", " w"), rows).as_bytes()).contains("no z"));
     assert!(refusal(b"solid cube\n").contains("is no PLY file"));
     assert!(refusal(b"ply").contains("damaged"));
+    let other = refusal(text(&header.replace("vertex_indices", "corners"), &format!("{rows}3 0 1 2\n")).as_bytes());
+    assert!(other.contains("no vertex_indices") && !other.contains("OBJ"), "{other}");
+    // What no end of a line ends is not read to its end.
+    assert!(refusal(format!("ply\n{}", "a".repeat(1 << 21)).as_bytes()).contains("a header of more than 1 MiB"));
+    assert!(refusal(text(&header, &"1".repeat((1 << 26) + 2)).as_bytes()).contains("more than 64 MiB in line 10"));
     // Claims that no file holds, of rows with and without properties.
     let huge = header.replace("face 1", "face 4000000000000");
     assert!(refusal(text(&huge, rows).as_bytes()).contains("claims 4000000000000 of \"face\""));
@@ -209,6 +240,11 @@ fn what_faces_have_and_is_not_read_is_named() {
         library.warnings
     };
     assert_eq!(said("", "3 0 1 2"), Vec::<String>::new());
+    let short = said("", "2 0 1");
+    assert!(
+        short.len() == 1 && short[0].ends_with("faces repaired: 1 of fewer than three corners dropped"),
+        "{short:?}"
+    );
     let both = said("property list uchar float texcoord\nproperty uchar red\n", "3 0 1 2 6 0 0 1 0 0 1 255");
     assert!(
         both.len() == 1 && both[0].ends_with("a.ply: not read: texture coordinates of faces, colours of faces"),

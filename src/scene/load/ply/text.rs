@@ -2,8 +2,11 @@
 use super::short;
 use crate::error::Checked;
 use ply_rs_bw::ply::{ElementDef, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 use std::str::{FromStr, SplitAsciiWhitespace};
+
+/// Bytes of the longest row.
+const LONGEST: u64 = 1 << 26;
 
 /// The rows of an element, one a line; `line` is the number of the first, and of the line after the last in the end.
 ///
@@ -13,7 +16,11 @@ pub fn rows<E: PropertyAccess>(reader: &mut dyn BufRead, element: &ElementDef, l
     let (mut rows, mut text) = (Vec::new(), String::new());
     for _ in 0..element.count {
         text.clear();
-        if !matches!(reader.read_line(&mut text), Ok(1..)) {
+        let read = (&mut *reader).take(LONGEST).read_line(&mut text);
+        if text.len() as u64 == LONGEST {
+            return Err(format!("has more than 64 MiB in line {line}: is it a PLY file?"));
+        }
+        if !matches!(read, Ok(1..)) {
             return Err(format!("is damaged or ends too early in line {line}: save it again as PLY 1.0"));
         }
         rows.push(row(&text, element).map_err(|what| format!("{what} in line {line}: save it again as PLY 1.0"))?);
