@@ -53,7 +53,13 @@ impl CheckpointFile {
     pub fn write(&mut self, files: &mut Files, film: &Film) -> Option<PathBuf> {
         let item = Item::image(self.path.clone(), film, WriteOptions::default());
         match files.add(&self.path, &item) {
-            Ok(place) => self.written = Some(place),
+            Ok(place) => {
+                if place != self.path && self.written.as_ref() != Some(&place) {
+                    let (old, new) = (self.path.display(), place.display());
+                    complain(&format!("note: {old} is another render's checkpoint: this one's is {new}"));
+                }
+                self.written = Some(place);
+            }
             Err(e) if !self.complained => {
                 complain(&format!("warning: {e}; the render goes on without this checkpoint"));
                 self.complained = true;

@@ -78,7 +78,14 @@ fn measured(
     warnings: &[String],
     measure: impl FnOnce(Option<Document>, &Watch) -> Result<Found>,
 ) -> Result<Exit> {
-    let folder = Folder::open(&args.output)?;
+    let inputs = [
+        ("--points", &args.points),
+        ("--reference", &args.reference),
+        ("--filter-only", &args.filter_only),
+        ("the scene", &args.scene),
+    ];
+    let inputs: Vec<_> = inputs.iter().filter_map(|(name, path)| Some((*name, path.as_deref()?))).collect();
+    let folder = Folder::open(&args.output, &inputs)?;
     let earlier = folder.earlier(key);
     let runs_before = earlier.as_ref().map_or(0, runs);
     let stop = interrupt::flag();

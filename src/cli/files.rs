@@ -61,7 +61,7 @@ pub fn first_with_layers(paths: &[PathBuf]) -> Option<&PathBuf> {
 }
 
 /// A key that is the same for all paths of one file.
-fn key(path: &Path) -> PathBuf {
+pub fn key(path: &Path) -> PathBuf {
     output::resolve(path).unwrap_or_else(|_| path.to_owned())
 }
 

@@ -141,6 +141,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut host = Spans::default();
     let plan = planned::read(args)?;
     let (scene, settings) = host.time("load scene", || load(args))?;
+    let asked = settings.clone();
     let settings = plan.as_ref().map_or(Ok(settings), |plan| planned::settings(args, plan, &scene))?;
     let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
     args.common.warn(&scene.warnings);
@@ -150,6 +151,9 @@ pub fn run(args: &Args) -> Result<Exit> {
         None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
     };
     let (args, settings) = &planned::applied(args, settings, plan.as_ref())?;
+    if let Some(method) = args.denoise {
+        method.check()?;
+    }
     check_room(args.filter(settings), settings, &gpu)?;
     check_stride(args, settings)?;
     tell_of_lens(args, &scene);
@@ -169,9 +173,10 @@ pub fn run(args: &Args) -> Result<Exit> {
         complain("interrupted before the first sample: nothing was written");
         return Ok(Exit::Interrupted);
     };
+    taken.resumes_by(plan.as_ref().map_or_else(String::new, |plan| planned::instead(plan, &asked)));
     let written = taken.finish(args, plan.as_ref(), true)?;
     if !taken.is_whole() {
-        complain(&outputs::interruption(&written, can_resume));
+        complain(&taken.interruption(&written, can_resume));
         return Ok(Exit::Interrupted);
     }
     Ok(Exit::Done)
@@ -198,7 +203,7 @@ pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
     }
     settings.validate()?;
     // A plan chooses the samples, and says itself what it cannot keep to.
-    if args.time.is_none() && args.error.is_none() {
+    if args.time.is_none() && args.error.is_none() && args.plan.is_none() {
         settings.check_most()?;
     }
     Ok((file.load()?, settings))
@@ -258,7 +263,7 @@ pub fn check_stride(args: &Args, settings: &Settings) -> Result<()> {
 }
 
 /// What a lens blurs has noise, of which most filters leave that of sharp light, lamps and sky.
-fn tell_of_lens(args: &Args, scene: &Scene) {
+pub fn tell_of_lens(args: &Args, scene: &Scene) {
     let leaves = args.denoise.is_some_and(|method| method.leaves_noise_of_lens());
     if leaves && light_and_camera_effects(scene).lens && args.common.talkative() {
         complain(

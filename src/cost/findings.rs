@@ -234,6 +234,9 @@ fn singles(all: &[Point]) -> Vec<Finding> {
     found
 }
 
+/// Below this, the relMSE of an image is rounding, of which no other is a multiple.
+const ROUNDING: f64 = 1e-12;
+
 /// Time and error of one filter beside the most accurate one.
 fn beside(point: &Point, best: &Point) -> Finding {
     let ratio = |(a, b): (&super::document::Run, &super::document::Run)| a.gpu_ms / b.gpu_ms;
@@ -241,16 +244,15 @@ fn beside(point: &Point, best: &Point) -> Finding {
     let times = interval::geometric_mean(&ratios, CONFIDENCE);
     let logarithms: Vec<f64> = ratios.iter().map(|r| r.ln()).collect();
     let (name, other) = (point.method.name(), best.method.name());
-    let error = |point: &Point| point.runs[0].errors.relmse.unwrap_or_default();
-    let more = percent(error(point) / error(best) - 1.0);
+    let [error, least] = [point, best].map(|point| point.runs[0].errors.relmse);
+    let more = match (error, least) {
+        (Some(error), Some(least)) if least > ROUNDING => format!("is {} higher", percent(error / least - 1.0)),
+        (Some(error), _) => format!("is {}", number(error)),
+        (None, _) => "is not known".to_owned(),
+    };
     match interval::differs_from_0(&logarithms, 1.0 - CONFIDENCE) {
-        true => clear(format!(
-            "{name} takes {} times the time of {other}, and its relMSE is {more} higher.",
-            factor(&times)
-        )),
-        false => {
-            noisy(format!("Whether {name} or {other} is faster the data cannot tell; its relMSE is {more} higher."))
-        }
+        true => clear(format!("{name} takes {} times the time of {other}, and its relMSE {more}.", factor(&times))),
+        false => noisy(format!("Whether {name} or {other} is faster the data cannot tell; its relMSE {more}.")),
     }
 }
 

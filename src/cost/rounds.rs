@@ -96,8 +96,9 @@ impl<R: Runs> Measuring<'_, R> {
                 let done = self.points[..ours].iter().map(|point| point.runs.len() as u64).sum();
                 (self.watch.progress)("runs", done, (ours * seeds.len()) as u64);
             }
+            // Complete is what has its pictures and its page as well.
             let (so_far, _) = document(&self.outline, self.points.clone(), reference, true);
-            (self.watch.keep)(&so_far);
+            (self.watch.keep)(&Document { complete: false, ..so_far });
         }
     }
 
@@ -122,16 +123,18 @@ impl<R: Runs> Measuring<'_, R> {
         let errors: Vec<_> = threads::within(|| measured.par_iter().map(judged).collect());
         for (found, errors) in measured.into_iter().zip(errors) {
             let Measured { point: index, run, picture, warm_up, device_bytes } = found;
+            if R::ALIKE || Some(&run.seed) == self.outline.seeds.first() {
+                self.pictures[index].get_or_insert(picture);
+            }
             let point = &mut self.points[index];
             point.runs.push(Run { errors, ..run });
             point.runs.sort_by_key(|run| run.seed);
             point.warm_up.get_or_insert(warm_up);
             point.device_bytes = point.device_bytes.max(Some(device_bytes));
-            self.pictures[index].get_or_insert(picture);
         }
     }
 
-    /// Pictures of points all of whose runs were made before this program was started.
+    /// Pictures of points whose first runs were made before this program was started.
     fn missing_pictures(&mut self) {
         let seeds = &self.outline.seeds;
         let Some(&seed) = seeds.first() else { return };

@@ -26,10 +26,13 @@ pub fn heat_map_to(test: &Picture, reference: &Picture, top: f32) -> Picture {
     false_colours(test.width, &errors(test, reference), top)
 }
 
-/// Draws values from 0 to `top` in the colours of [`heat_map`], with its scale bar. The picture is [`WIDER`] columns wider
-/// than `width`.
+/// Draws values from 0 to `top` (1, if that is not above 0) in the colours of [`heat_map`], with its scale bar. The picture is [`WIDER`]
+/// columns wider than `width`.
+///
+/// # Panics
+/// For a width of 0.
 pub fn false_colours(width: u32, values: &[f32], top: f32) -> Picture {
-    let magma = magma();
+    let (magma, top) = (magma(), if top > 0.0 { top } else { 1.0 });
     let colour = |fraction: f32| magma[(fraction * 255.0).round().min(255.0) as usize];
     let width = width as usize;
     let height = values.len() / width;

@@ -142,13 +142,8 @@ impl<'a> Probe<'a> {
             };
             Measured { error, ms: a.filter_ms[method].min(b.filter_ms[method]) }
         };
-        let level = |(spp, pair): &(u32, [Image; 2])| Level {
-            spp: *spp,
-            start_ms: 0.5 * (pair[0].start_ms + pair[1].start_ms),
-            samples_ms: 0.5 * (pair[0].samples_ms + pair[1].samples_ms),
-            methods: (0..self.methods.len()).map(|method| measured(pair, method)).collect(),
-        };
-        pairs.iter().map(level).collect()
+        let methods = |pair| (0..self.methods.len()).map(|method| measured(pair, method)).collect();
+        pairs.iter().map(|(spp, pair)| level(*spp, pair, methods(pair))).collect()
     }
 
     fn image(&mut self, seed: u32, spp: u32) -> Result<Image> {
@@ -233,6 +228,12 @@ impl Probe<'_> {
     }
 }
 
+/// Of a pair of images, whose times are the mean of both.
+fn level(spp: u32, [a, b]: &[Image; 2], methods: Vec<Measured>) -> Level {
+    let [start_ms, samples_ms] = [a.start_ms + b.start_ms, a.samples_ms + b.samples_ms].map(|both| 0.5 * both);
+    Level { spp, start_ms, samples_ms, methods }
+}
+
 /// Samples per pixel of the level after one of so many; none where a render may not have them.
 fn next_spp(spp: u32) -> Option<u32> {
     spp.checked_mul(GROWTH).filter(|next| *next <= Settings::MAX_SPP)
@@ -241,6 +242,19 @@ fn next_spp(spp: u32) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_level_costs_what_one_of_its_images_does() {
+        let image = |start_ms, samples_ms| Image {
+            noisy: Vec::new(),
+            filtered: Vec::new(),
+            start_ms,
+            samples_ms,
+            filter_ms: Vec::new(),
+        };
+        let level = level(4, &[image(1.0, 10.0), image(3.0, 14.0)], Vec::new());
+        assert_eq!((level.spp, level.start_ms, level.samples_ms), (4, 2.0, 12.0));
+    }
 
     #[test]
     fn levels_end_where_renders_do() {

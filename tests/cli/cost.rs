@@ -45,6 +45,13 @@ fn point<'a>(document: &'a Document, label: &str) -> &'a Point {
     document.points.iter().find(|point| point.method.label() == label).unwrap()
 }
 
+/// The pictures of a page.
+fn pictures(folder: &TempDir) -> Vec<String> {
+    let page = std::fs::read_to_string(folder.path().join("all/cost.html")).unwrap();
+    let begin = "<script type=\"application/octet-stream\">";
+    page.split(begin).skip(1).map(|rest| rest.split('<').next().unwrap().to_owned()).collect()
+}
+
 /// The reference that was rendered and kept.
 fn reference(folder: &TempDir) -> PathBuf {
     let kept = std::fs::read_dir(folder.path().join("cache/tallow/references")).unwrap();
@@ -141,7 +148,7 @@ fn a_frame_of_a_scene_that_moves_is_measured_alone_and_as_the_end_of_a_sequence(
     let folder = tempfile::tempdir().unwrap();
     let moving = scene().replace("cornell-box", "moving");
     let words =
-        "--width 24 --height 16 --allocate uniform --denoise none,svgf --spp 2 --repeats 2 --reference-spp 64 -o all";
+        "--width 24 --height 16 --allocate uniform --denoise none,svgf --spp 2 --repeats 6 --reference-spp 64 -o all";
     let mut command = within(&folder, &format!("cost {moving} {words} --validation --variant"));
     text(&command.args(["--reproject-samples 1"]).output().unwrap(), 0);
     let document = document(&folder, "all/cost.json");
@@ -165,6 +172,8 @@ fn what_is_missing_is_completed_and_nothing_else_is_measured_again() {
     let words = "--allocate uniform --denoise none --spp 1,2 --repeats 3 -o all --quiet";
     text(&cost(&folder, words), 0);
     let whole = document(&folder, "all/cost.json");
+    let shown = pictures(&folder);
+    assert_eq!(shown.len(), 3, "two points and the reference");
     let mut partial = whole.clone();
     partial.complete = false;
     partial.points[1].runs.pop();
@@ -183,6 +192,7 @@ fn what_is_missing_is_completed_and_nothing_else_is_measured_again() {
     assert_eq!(again.points[1].runs[..2], whole.points[1].runs[..2]);
     assert_eq!(again.points[1].runs[2].errors, whole.points[1].runs[2].errors);
     assert_ne!(again.points[1].runs[2].gpu_ms, whole.points[1].runs[2].gpu_ms, "control: this one was measured");
+    assert!(pictures(&folder) == shown, "all points are shown with their first seed");
     // Another measurement begins anew, and does not replace a whole one by a part.
     let other = "--allocate uniform --denoise none --spp 1,2 --repeats 4 -o all --budget-minutes 0.000001";
     let printed = text(&cost(&folder, other), 0);
@@ -288,6 +298,11 @@ fn filters_are_measured_on_a_given_image() {
     text(&within(&folder, words).output().unwrap(), 0);
     let error = self::document(&folder, "wide/cost.json").points[0].runs[0].errors.relmse.unwrap();
     assert!(error < 1e-9, "{error}");
+    // Where nothing is wrong with one, by how much another is worse is no number.
+    let words = "cost --filter-only clean.exr --reference clean.exr --denoise none,atrous --repeats 2 -o same";
+    text(&within(&folder, words).output().unwrap(), 0);
+    let findings = serde_json::to_string(&self::document(&folder, "same/cost.json").findings).unwrap();
+    assert!(findings.contains("its relMSE is ") && !findings.contains(" higher"), "{findings}");
 }
 
 #[test]
@@ -309,6 +324,15 @@ fn what_cannot_be_measured_is_one_line() {
     complains(&cost(&folder, "--reference other.exr"), 3, &["other.exr: shows another scene"]);
     complains(&within(&folder, "cost").output().unwrap(), 2, &["SCENE"]);
     complains(&within(&folder, "cost missing.toml").output().unwrap(), 3, &["missing.toml"]);
+    std::fs::create_dir(folder.path().join("table")).unwrap();
+    let rows = "method,filter,spp,seed,ms,image\nother,none,4,0,10,../other.exr\n";
+    std::fs::write(folder.path().join("table/cost.csv"), rows).unwrap();
+    complains(
+        &cost(&folder, "--points table/cost.csv --spp 1 -o table"),
+        2,
+        &["table/cost.csv is the same file as --points"],
+    );
+    assert_eq!(std::fs::read(folder.path().join("table/cost.csv")).unwrap(), rows.as_bytes());
     complains(&cost(&folder, "--spp 0"), 2, &["spp is 0"]);
     complains(&cost(&folder, "--denoise blur"), 2, &["blur"]);
     complains(&cost(&folder, "--repeats 1"), 2, &["1"]);

@@ -78,6 +78,9 @@ fn without_the_library_one_line_says_how_to_get_it_and_nothing_is_rendered() {
     let parts = ["Open Image Denoise", "TALLOW_OIDN: /nonexistent/oidn.so", "install", "official release"];
     complains(&render(missing, &folder), 4, &parts);
     complains(&with(missing, &folder, &["filter", "noisy.exr", "-o", "clean.exr", "--filter", "oidn"]), 4, &parts);
+    let scene = scene();
+    let frames = ["sequence", &scene, "--frames", "0..3", "--turntable", "9", "--denoise", "oidn", "-o", "clean.#.exr"];
+    complains(&with(missing, &folder, &frames), 4, &parts);
     assert!(!folder.path().join("clean.exr").exists());
     let other = compiled("other_library", "int nothing;");
     complains(

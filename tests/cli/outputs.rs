@@ -139,6 +139,7 @@ fn one_file_for_two_things_is_refused_before_anything_is_done() {
         ("--profile s.toml", "the scene"),
         ("--resume a.exr --profile a.exr", "--resume"),
         ("--resume a.exr --profile link.exr", "--resume"),
+        ("--plan p.json --profile p.json", "--plan"),
         ("-o n.exr -o n.partial.exr --checkpoint 5", "-o"),
     ] {
         refused(&format!("render s.toml {words}"), &["is the same file as", other]);
@@ -201,4 +202,8 @@ fn noise_that_a_lens_shows_and_a_filter_leaves_is_told() {
         [told(0.1, "atrous"), told(0.1, "auto"), told(0.1, "none"), told(0.0, "atrous")],
         [true, false, false, false]
     );
+    told(0.1, "none");
+    let output = run(&folder, "sequence s.toml --frames 0..2 --turntable 90 --spp 1 --denoise atrous -o s.#.png");
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(text.matches("where the lens blurs").count(), 1, "{text}");
 }

@@ -28,6 +28,7 @@ fn a_plan_is_rendered_and_rendered_again_to_the_same_bits() {
         plan["chosen"]["relmse"].as_f64().unwrap() <= 0.0201 && plan["others"].as_array().unwrap().len() == 1,
         "{plan}"
     );
+    assert!(plan["chosen"]["gpu_ms"].as_f64() <= plan["others"][0]["gpu_ms"].as_f64(), "the faster one: {plan}");
     let again = render(&folder, SCENE, "--plan plan.json -o b.exr --json");
     let json: Value = serde_json::from_slice(&again.stdout).unwrap();
     assert!(json["plan"] == plan && json["gpu_ms"].as_f64().unwrap() > 0.0, "{json}");
@@ -42,6 +43,15 @@ fn a_plan_is_rendered_and_rendered_again_to_the_same_bits() {
     let missed = stdout(&render(&folder, SCENE, "--plan slow.json -o b.exr"));
     assert!(missed.contains(&format!("where {long:.1} ms were planned")), "{missed}");
     assert!(!missed.contains("probe"), "nothing was probed: {missed}");
+    // A scene whose own policy could not give the samples that a plan gives by another.
+    let few = std::fs::read_to_string(SCENE).unwrap() + "\n[allocate]\nmax_spp = 4\n";
+    let beside = Path::new(SCENE).parent().unwrap().display().to_string();
+    let few = few.replace("file = \"", &format!("file = \"{beside}/"));
+    std::fs::write(folder.path().join("few.toml"), few).unwrap();
+    let kept = render(&folder, "few.toml", &format!("{SMALL} --allocate both --error 0.3 --plan few.json -o d.exr"));
+    assert!(kept.status.success(), "{kept:?}");
+    let followed = render(&folder, "few.toml", "--plan few.json -o e.exr");
+    assert!(followed.status.success() && picture("d.exr") == picture("e.exr"), "{followed:?}");
     // Control: other samples are other bits.
     assert!(render(&folder, SCENE, &format!("{SMALL} --error 0.02 --seed 7 -o c.exr")).status.success());
     assert!(picture("a.exr") != picture("c.exr"));
@@ -50,18 +60,27 @@ fn a_plan_is_rendered_and_rendered_again_to_the_same_bits() {
 #[test]
 fn a_time_decides_the_samples_and_a_given_filter_is_taken() {
     let folder = tempfile::tempdir().unwrap();
-    let spp = |time: &str| {
-        let output = render(&folder, SCENE, &format!("{SMALL} --time {time} --denoise none -o a.exr --json"));
+    let plan = |words: &str| {
+        let output = render(&folder, SCENE, &format!("{SMALL} {words} -o a.exr --json"));
         let json: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {output:?}"));
-        assert!(
-            json["plan"]["chosen"]["denoise"].is_null() && json["plan"]["others"] == serde_json::json!([]),
-            "{json}"
-        );
-        json["plan"]["chosen"]["spp"].as_u64().unwrap()
+        json["plan"].clone()
     };
-    // Ten times the time is several times the samples even where other programs run.
+    let spp = |time: &str| {
+        let plan = plan(&format!("--time {time} --denoise none"));
+        assert!(plan["chosen"]["denoise"].is_null() && plan["others"] == serde_json::json!([]), "{plan}");
+        plan["chosen"]["spp"].as_u64().unwrap()
+    };
+    // Twenty times the time is several times the samples even where other programs run.
     let [few, many] = ["100ms", "2s"].map(spp);
     assert!(many > 3 * few, "{few} and {many} samples");
+    // Of several filters the one with the least error is taken.
+    let free = plan("--time 1s");
+    let (chosen, others) = (&free["chosen"], free["others"].as_array().unwrap());
+    assert!(others.len() == 1 && chosen["relmse"].as_f64() <= others[0]["relmse"].as_f64(), "{free}");
+    // What placed samples cost is told by a render of as many, which is a part of the probe.
+    let placed = plan("--time 400ms --allocate both --denoise none");
+    let [probe, planned] = [&placed["probe_ms"], &placed["chosen"]["gpu_ms"]].map(|ms| ms.as_f64().unwrap());
+    assert!(probe > 0.4 * planned, "{placed}");
 }
 
 #[test]

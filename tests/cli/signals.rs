@@ -64,6 +64,24 @@ fn signals_that_come_together_ask_once() {
     }
 }
 
+/// It belongs to a render that crashed: its checkpoint is not replaced, and where the new one is, is told at once.
+#[test]
+fn a_checkpoint_of_another_render_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.partial.exr"), "of another").unwrap();
+    let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} -o a.exr", scene()));
+    running.until_there_is("a.partial-2.exr");
+    running.send(&["TERM"]);
+    let output = running.end();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(
+        text.matches("a.partial.exr is another render's checkpoint: this one's is a.partial-2.exr").count(),
+        1,
+        "{text}"
+    );
+    assert_eq!(std::fs::read(folder.path().join("a.partial.exr")).unwrap(), b"of another");
+}
+
 #[test]
 fn ctrl_c_ends_a_write_that_nobody_reads_after_all_others() {
     let folder = tempfile::tempdir().unwrap();

@@ -138,6 +138,12 @@ fn what_cannot_be_tested_is_one_line() {
     complains(&compare(&folder, "a.exr b.exr --map a.exr"), 2, &["a.exr", ".png"]);
     complains(&compare(&folder, "a.exr b.exr --junit b.exr"), 2, &["--junit", "same file as B"]);
     complains(&compare(&folder, "a.exr b.exr --evidence a.exr"), 5, &["a.exr", "--evidence"]);
+    // Nor does a file that was compared, or a report beside it, become another one.
+    let bytes = || ["a.exr", "b.exr"].map(|name| std::fs::read(folder.path().join(name)).unwrap());
+    let before = bytes();
+    complains(&compare(&folder, "b.exr a.exr --evidence ."), 2, &["--evidence", "a.exr is the same file as B"]);
+    complains(&compare(&folder, "a.exr b.exr --evidence . --html report.html"), 2, &["--html", "report.html"]);
+    assert!(bytes() == before);
     complains(&tallow(&folder, &["compare", "a.exr", "b.exr", "--map", "m.png"]), 2, &["--statistical"]);
     // A reference without variance counts by its standard errors.
     let errors = {

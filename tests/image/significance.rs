@@ -1,6 +1,6 @@
 //! Tests of the test whether two renders have the same expectation: how often it errs, and what it finds.
 use tallow::image::significance::{Estimate, Noise, Options, Outcome, Scale, Verdict, suspects, test};
-use tallow::image::{Film, Samples};
+use tallow::image::{Film, Samples, Window};
 
 /// How the samples of a pixel are distributed; the mean of all is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,6 +190,10 @@ fn what_does_not_tell_its_noise_is_refused() {
     refused(&film(1.0, 0.0, 1), "--spp 2");
     refused(&film(f32::NAN, 0.01, 16), "each of its 20 pixels");
     refused(&film(1.0, f32::INFINITY, 16), "infinite");
+    let mut broken = good.clone();
+    let red = broken.channels.iter_mut().find(|c| c.name == "R").unwrap();
+    red.samples = Samples::F32((0..20).map(|i| if i == 7 { f32::NAN } else { 1.0 }).collect());
+    refused(&broken, "1 of 20 pixels are NaN or infinite, the first (2, 1)");
     let mut bare = good.clone();
     bare.channels.retain(|c| !c.name.starts_with("m2"));
     refused(&bare, "--errors");
@@ -204,6 +208,15 @@ fn what_does_not_tell_its_noise_is_refused() {
     of_pbrt.metadata.insert("samplesPerPixel".to_owned(), "16".to_owned());
     let Noise::Samples { m2, count } = Estimate::of_film(&of_pbrt).unwrap().noise else { panic!("no samples") };
     assert_eq!((m2[7], count[7]), ([7.5; 3], 16.0), "m2 / (n - 1) is the variance of a sample");
+    // Of a part of the picture the rest has no samples.
+    let left = Window { first: [0, 0], size: [2, 4] };
+    let mut part = of_pbrt.clone();
+    part.channels.iter_mut().for_each(|c| c.window = Some(left));
+    let Noise::Samples { count, .. } = Estimate::of_film(&part).unwrap().noise else { panic!("no samples") };
+    assert_eq!(count[..6], [16.0, 16.0, 0.0, 0.0, 0.0, 16.0]);
+    part.metadata.clear();
+    part.channels.retain(|c| !c.name.starts_with("Relative"));
+    refused(&part, "a part of its picture");
     // With the noisy image beside the filtered one, that is what counts.
     filtered.add_vec3("Noisy Image", ["R", "G", "B"], &[[2.0; 3]; 20]);
     assert_eq!(Estimate::of_film(&filtered).unwrap().mean[0], [2.0; 3]);
@@ -225,6 +238,10 @@ fn a_reference_with_standard_errors_counts_them() {
         let errors = tallow::image::Picture { width: 5, height: 4, pixels: vec![[error; 3]; 20] };
         Estimate::with_errors(&film, &errors).unwrap()
     };
+    let mut film_alone = Film::new(5, 4);
+    film_alone.add_vec3("", ["R", "G", "B"], &[[1.0; 3]; 20]);
+    let signed = tallow::image::Picture { width: 5, height: 4, pixels: vec![[-0.02; 3]; 20] };
+    assert!(Estimate::with_errors(&film_alone, &signed).unwrap_err().contains("negative"));
     // The images differ by 3 %; the standard errors of 20 pixels together are 0.2236 times those of one.
     let a = Estimate::of_film(&film(1.03, 1e-6, 64)).unwrap();
     assert!(differs(&test(&a, &reference(0.001), &options(0.01)).unwrap()));

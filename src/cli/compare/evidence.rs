@@ -2,15 +2,18 @@
 use super::replay;
 use super::report::{Report, Side, write_png};
 use super::words;
+use crate::cli::files::key;
 use crate::error::{Error, Result};
 use crate::image::output;
 use crate::image::significance::{Finding, suspects};
 use serde_json::json;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Names of the files of A and B in the folder.
 const NAMES: [&str; 2] = ["a", "b"];
+/// Names of all other files in it.
+const VIEWS: [&str; 6] = ["a.png", "b.png", "map.png", "report.html", "report.json", "replay.sh"];
 
 /// Checks, before the images are read, that the folder exists or can be made.
 ///
@@ -22,6 +25,24 @@ pub fn check(folder: &Path) -> Result<()> {
     output::check(&folder.join("report.json"))
 }
 
+/// The files that [`write`] makes of these images. One that is the image itself is not among them: it stays as it is.
+pub fn files(folder: &Path, images: [&Path; 2]) -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> = VIEWS.iter().map(|name| folder.join(name)).collect();
+    let copies = NAMES.iter().zip(images).map(|(name, image)| (copy_of(folder, name, image), image));
+    all.extend(
+        copies
+            .filter(|(copy, image)| key(copy) != key(image) && !all.contains(copy))
+            .map(|(copy, _)| copy)
+            .collect::<Vec<_>>(),
+    );
+    all
+}
+
+fn copy_of(folder: &Path, name: &str, image: &Path) -> PathBuf {
+    let extension = image.extension().map_or("exr".into(), |e| e.to_string_lossy());
+    folder.join(format!("{name}.{extension}"))
+}
+
 /// Writes both images, the map, the page, all figures, and the worst pixels with the commands that render them again.
 ///
 /// # Errors
@@ -29,7 +50,10 @@ pub fn check(folder: &Path) -> Result<()> {
 pub fn write(folder: &Path, report: &Report) -> Result<()> {
     for (name, side) in NAMES.iter().zip(report.sides) {
         copy(folder, name, side)?;
-        write_png(&folder.join(format!("{name}.png")), &side.picture())?;
+        let view = folder.join(format!("{name}.png"));
+        if view != copy_of(folder, name, &side.path) {
+            write_png(&view, &side.picture())?;
+        }
     }
     report.write_map(&folder.join("map.png"))?;
     output::write(&folder.join("report.html"), super::page::html(report).as_bytes())?;
@@ -46,8 +70,7 @@ pub fn write(folder: &Path, report: &Report) -> Result<()> {
 /// Copies a file as it is, since only the bytes themselves hold everything.
 fn copy(folder: &Path, name: &str, side: &Side) -> Result<()> {
     let bytes = std::fs::read(&side.path).map_err(|e| Error::input(&side.path, e))?;
-    let extension = side.path.extension().map_or("exr".into(), |e| e.to_string_lossy());
-    output::write(&folder.join(format!("{name}.{extension}")), &bytes)
+    output::write(&copy_of(folder, name, &side.path), &bytes)
 }
 
 /// A shell script that renders the worst pixels of both images again.

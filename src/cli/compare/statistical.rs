@@ -117,6 +117,10 @@ fn check_outputs(a: &Path, b: &Path, args: &Args) -> Result<()> {
             outputs.push((option, path));
         }
     }
+    let evidence = args.evidence.as_ref().map_or_else(Vec::new, |folder| evidence::files(folder, [a, b]));
+    for path in &evidence {
+        outputs.push(("--evidence", path));
+    }
     let mut inputs = vec![("A", a), ("B", b)];
     inputs.extend(args.errors.as_deref().map(|errors| ("--errors", errors)));
     check_distinct(&outputs, &inputs)?;

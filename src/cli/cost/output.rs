@@ -1,5 +1,5 @@
 //! What `tallow cost` reads, writes, shows and prints.
-use crate::cli::files::{Files, Item, partial_name};
+use crate::cli::files::{Files, Item, check_distinct, partial_name};
 use crate::cli::progress::Progress;
 use crate::cli::readable;
 use crate::cost::changes::{option, plain};
@@ -26,11 +26,14 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Makes the folder if it is missing, checks that it can be written to, and reads what an earlier run left there.
+    /// Makes the folder if it is missing, checks that it can be written to, and reads what an earlier run left there. `inputs`, each with
+    /// the option that names it, are not replaced.
     ///
     /// # Errors
-    /// [`Error::Output`], and [`Error::Input`] for a document of a newer version.
-    pub fn open(path: &Path) -> Result<Self> {
+    /// [`Error::Usage`], [`Error::Output`], and [`Error::Input`] for a document of a newer version.
+    pub fn open(path: &Path, inputs: &[(&str, &Path)]) -> Result<Self> {
+        let places = NAMES.map(|name| path.join(name));
+        check_distinct(&places.each_ref().map(|place| ("-o", &**place)), inputs)?;
         std::fs::create_dir_all(path).map_err(|e| Error::output(path, format!("cannot be made: {e}")))?;
         NAMES.iter().try_for_each(|name| output::check(&path.join(name)))?;
         let json = path.join(NAMES[0]);
@@ -288,9 +291,9 @@ mod tests {
         let whole = Document { complete: true, ..document("whole") };
         let pictures =
             Images { reference: Picture { width: 1, height: 1, pixels: vec![[0.0; 3]] }, points: Vec::new() };
-        Folder::open(folder.path()).unwrap().write(&whole, &pictures, true);
+        Folder::open(folder.path(), &[]).unwrap().write(&whole, &pictures, true);
         for key in ["first", "second", "third"] {
-            let open = Folder::open(folder.path()).unwrap();
+            let open = Folder::open(folder.path(), &[]).unwrap();
             assert!(open.earlier(key).is_none());
             open.keep(&document(key));
             open.write(&document(key), &pictures, false);
@@ -300,7 +303,7 @@ mod tests {
         assert_eq!(files.each_ref().map(|file| of(file)), ["first", "second", "third"]);
         let count = || std::fs::read_dir(folder.path()).unwrap().count();
         let before = count();
-        let open = Folder::open(folder.path()).unwrap();
+        let open = Folder::open(folder.path(), &[]).unwrap();
         let mut more = open.earlier("third").unwrap();
         let run = more.points[0].runs[0].clone();
         more.points[0].runs.push(run);
@@ -310,7 +313,7 @@ mod tests {
         assert_eq!(files.each_ref().map(|file| of(file)), ["first", "second", "third"]);
         // Of two with one key, the one with more runs.
         std::fs::write(inside("cost.partial-12.json"), json(&document("third"))).unwrap();
-        let open = Folder::open(folder.path()).unwrap();
+        let open = Folder::open(folder.path(), &[]).unwrap();
         assert_eq!(open.earlier("third").as_ref(), Some(&more));
         open.write(&Document { complete: true, ..more }, &pictures, true);
         assert!(!files[2].exists() && files[0].exists() && files[1].exists(), "only its own are removed");

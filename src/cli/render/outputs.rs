@@ -30,9 +30,10 @@ pub fn check(args: &Args) -> Result<()> {
     let traces = args.profile.iter().map(|path| ("--profile", path.as_path()));
     let plans = planned::to_write(args).map(|path| ("--plan", path));
     let others: Vec<_> = colours.into_iter().chain(maps).chain(traces).chain(plans).collect();
-    let resumed: Vec<_> = args.resume.iter().map(|path| ("--resume", path.as_path())).collect();
+    let followed = args.plan.iter().filter(|_| !planned::is_made(args)).map(|path| ("--plan", path.as_path()));
+    let resumed = args.resume.iter().map(|path| ("--resume", path.as_path()));
     // A resumed file may become the complete one.
-    check_distinct(&others, &resumed)?;
+    check_distinct(&others, &resumed.chain(followed).collect::<Vec<_>>())?;
     let partial = args.checkpoint.map(|_| ("--checkpoint", checkpoint.as_path()));
     let all: Vec<_> = layers.into_iter().chain(others).chain(partial).collect();
     check_distinct(&all, &[("the scene", &args.scene)])
@@ -99,14 +100,15 @@ pub fn before_filter<'a>(args: &Args, film: &'a Film) -> Option<Item<'a>> {
     Some(Item::image(path, film, args.png.write_options()))
 }
 
-/// Says what there is when a signal ends the filter.
-pub fn unfiltered(written: &[PathBuf]) -> String {
+/// Says what there is when a signal ends the filter. `instead` is what goes behind the file to resume.
+pub fn unfiltered(written: &[PathBuf], instead: &str) -> String {
     if written.is_empty() {
         return "interrupted: --denoise was not finished, and nothing was written".to_owned();
     }
     let how = written.iter().find(|path| image::has_layers(path));
-    let how =
-        how.map(|path| format!("; --resume {} filters it", quoted(&path.display().to_string()))).unwrap_or_default();
+    let how = how
+        .map(|path| format!("; --resume {}{instead} filters it", quoted(&path.display().to_string())))
+        .unwrap_or_default();
     format!("interrupted: the noisy image was written to {}, --denoise was not finished{how}", names(written))
 }
 
@@ -118,12 +120,11 @@ pub fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
     images.chain(args.heatmap.iter().map(heatmap)).collect()
 }
 
-/// Says where what there is was written, and how to go on where a device can.
-pub fn interruption(written: &[PathBuf], can_resume: bool) -> String {
+/// Says where what there is was written, and how to go on where a device can. `instead` is what goes behind the file to resume.
+pub fn interruption(written: &[PathBuf], can_resume: bool, instead: &str) -> String {
     let resumable = written.iter().find(|path| can_resume && image::has_layers(path));
-    let how = resumable.map(|path| format!("; --resume {} continues it", quoted(&path.display().to_string())));
-    let how = how.unwrap_or_default();
-    format!("interrupted: what there is was written to {}{how}", names(written))
+    let how = resumable.map(|path| format!("; --resume {}{instead} continues it", quoted(&path.display().to_string())));
+    format!("interrupted: what there is was written to {}{}", names(written), how.unwrap_or_default())
 }
 
 fn names(written: &[PathBuf]) -> String {
@@ -145,8 +146,9 @@ mod tests {
 
     #[test]
     fn what_is_told_of_an_interruption_can_be_typed() {
-        let line = interruption(&[PathBuf::from("a.png"), PathBuf::from("my out.exr")], true);
+        let written = [PathBuf::from("a.png"), PathBuf::from("my out.exr")];
+        let line = interruption(&written, true, "");
         assert!(line.ends_with("written to a.png, my out.exr; --resume 'my out.exr' continues it"), "{line}");
-        assert!(!interruption(&[PathBuf::from("my out.exr")], false).contains("--resume"));
+        assert!(!interruption(&written, false, "").contains("--resume"));
     }
 }

@@ -1,6 +1,7 @@
 //! `--time`, `--error` and `--plan`: a render whose samples and filter are planned, or were planned by an earlier one.
 use super::{Args, check_room};
 use crate::cli::files::Item;
+use crate::cost::grid;
 use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, milliseconds};
@@ -98,6 +99,14 @@ pub fn applied(args: &Args, settings: Settings, plan: Option<&Plan>) -> Result<(
     Ok((Args { denoise: plan.method()?, ..args.clone() }, plan.settings.clone()))
 }
 
+/// What a render goes on with that followed a plan: the plan's filter, and its settings where others were asked for.
+pub fn instead(plan: &Plan, asked: &Settings) -> String {
+    let settings = grid::options(&asked.entries(), &plan.settings.entries());
+    let filter = plan.chosen.denoise.iter().map(|filter| format!("--denoise {filter}"));
+    let options: String = settings.into_iter().chain(filter).map(|option| format!(" {option}")).collect();
+    format!("{options} in place of --time, --error and --plan")
+}
+
 /// The plan's file.
 ///
 /// # Errors
@@ -111,7 +120,29 @@ pub fn item(args: &Args, plan: Option<&Plan>) -> Result<Option<Item<'static>>> {
 mod tests {
     use super::*;
     use crate::gpu::{DeviceOptions, Tuning};
+    use crate::plan::Expected;
     use clap::Parser;
+
+    /// The scene's own film is another one, and its samples are even.
+    #[test]
+    fn what_was_planned_goes_on_by_options() {
+        let asked = Settings { width: 512, ..Settings::default() };
+        let chosen = Expected { denoise: Some("auto".to_owned()), spp: 37, gpu_ms: 1.0, relmse: 0.1 };
+        let plan = Plan {
+            version: 1,
+            target: Target::GpuMs(1.0),
+            scene: String::new(),
+            device: String::new(),
+            settings: Settings { width: 33, spp: 37, ..asked.clone() },
+            chosen,
+            others: Vec::new(),
+            probe_ms: 1.0,
+        };
+        assert_eq!(
+            instead(&plan, &asked),
+            " --width 33 --spp 37 --denoise auto in place of --time, --error and --plan"
+        );
+    }
 
     #[derive(Parser)]
     struct Command {

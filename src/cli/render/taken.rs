@@ -34,6 +34,8 @@ pub struct Taken<'a> {
     noisy: Option<Noisy>,
     files: Files,
     checkpoint: Option<CheckpointFile>,
+    /// What `--resume` needs beside the options that were given; empty without a plan.
+    instead: String,
 }
 
 /// A signal and a checkpoint wait for a step.
@@ -64,13 +66,24 @@ pub fn shoot<'a>(
     let seconds = host.seconds("render");
     let film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| job.renderer.counters()).transpose()?;
-    Ok(Some(Taken { gpu, scene, film, host, status, counters, notes: Vec::new(), noisy, files, checkpoint }))
+    let (notes, instead) = (Vec::new(), String::new());
+    Ok(Some(Taken { gpu, scene, film, host, status, counters, notes, noisy, files, checkpoint, instead }))
 }
 
 impl Taken<'_> {
     /// Whether all of its samples were taken.
     pub fn is_whole(&self) -> bool {
         self.status.stopped != StopReason::Interrupted
+    }
+
+    /// Says what `--resume` needs in place of the plan that was followed.
+    pub fn resumes_by(&mut self, instead: String) {
+        self.instead = instead;
+    }
+
+    /// Where the images were written of which the samples are not all taken, and how to go on if the device can.
+    pub fn interruption(&self, written: &[PathBuf], can_resume: bool) -> String {
+        outputs::interruption(written, can_resume, &self.instead)
     }
 
     /// What was rendered, filtered once [`Taken::finish`] has done so.
@@ -109,10 +122,10 @@ impl Taken<'_> {
 
     /// From here on a signal ends the process, which says where the noisy image is.
     fn save_noisy(&mut self, args: &Args) -> Result<()> {
-        let Self { film, host, files, checkpoint, .. } = self;
+        let Self { film, host, files, checkpoint, instead, .. } = self;
         let item = outputs::before_filter(args, film);
         let save = || Ok(outputs::save_noisy(item.as_slice(), film, files, checkpoint));
-        let line = outputs::unfiltered(&host.time("write", save)?);
+        let line = outputs::unfiltered(&host.time("write", save)?, instead);
         let line = files.with_failures(&line);
         if interrupt::leave_at_once(&line) {
             interrupt::leave(&line);

@@ -5,6 +5,9 @@ use crate::render::settings::Settings;
 use crate::render::{HISTORY, Reproject, is_frame, metadata_of_frame};
 use crate::scene::{Fingerprint, Scene};
 
+/// What a film that begins anew says of the frames before it.
+const NONE: &str = "none";
+
 /// The frames up to one, as a number that tells them from others; none where the next frame begins anew.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Chain(Option<String>);
@@ -16,13 +19,21 @@ impl Chain {
     }
 
     fn text(&self) -> &str {
-        self.0.as_deref().unwrap_or("none")
+        self.0.as_deref().unwrap_or(NONE)
     }
 
     /// The chain that a finished film goes on, where this one has not begun.
     pub fn or_of(&self, film: &Film) -> Self {
-        let said = || film.metadata.get(HISTORY).filter(|text| *text != "none").cloned();
+        let said = || film.metadata.get(HISTORY)?.split(' ').next().filter(|text| *text != NONE).map(str::to_owned);
         Self(self.0.clone().or_else(said))
+    }
+
+    /// What a film says: the frames before it, and how it takes their samples.
+    fn said(&self, how: Option<Reproject>) -> String {
+        let Some(before) = &self.0 else { return NONE.to_owned() };
+        let mut all = Fingerprint::default();
+        all.add(format!("{how:?}").as_bytes());
+        format!("{before} {all}")
     }
 
     /// Goes on by a frame.
@@ -41,13 +52,13 @@ impl Chain {
     ///
     /// # Errors
     /// Those of [`Scene::fingerprint`].
-    pub fn tell(&self, film: &mut Film, scene: &Scene, settings: &Settings) -> Result<()> {
-        film.metadata.extend(metadata_of_frame(scene, settings, self.text())?);
+    pub fn tell(&self, film: &mut Film, scene: &Scene, settings: &Settings, how: Option<Reproject>) -> Result<()> {
+        film.metadata.extend(metadata_of_frame(scene, settings, &self.said(how))?);
         Ok(())
     }
 
     /// Whether a film is the next frame. The first frame of a run may go on from frames that this run knows nothing of.
-    pub fn ends_in(&self, film: &Film, scene: &Scene, settings: &Settings) -> bool {
-        is_frame(film, scene, settings, self.or_of(film).text())
+    pub fn ends_in(&self, film: &Film, scene: &Scene, settings: &Settings, how: Option<Reproject>) -> bool {
+        is_frame(film, scene, settings, &self.or_of(film).said(how))
     }
 }

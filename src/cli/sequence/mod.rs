@@ -145,6 +145,9 @@ impl Args {
                  goes on by itself where it stopped"
             )));
         }
+        if let Some(method) = self.render.denoise {
+            method.check()?;
+        }
         let first = match &self.frames {
             Some(frames) => self.numbers(frames)?.start,
             None => 0,

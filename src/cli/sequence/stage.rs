@@ -75,6 +75,7 @@ impl<'a> Stage<'a> {
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(args.render.filter(&settings), &settings, &gpu)?;
         render::check_stride(&args.render, &settings)?;
+        render::tell_of_lens(&args.render, &scene);
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         let rest = survey.effects(&settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
@@ -186,7 +187,7 @@ impl<'a> Stage<'a> {
         let mut shot = render::shoot(args, &self.gpu, &self.scene, job, Files::of_frame(), Spans::default())?;
         if let Some(shot) = shot.as_mut().filter(|_| self.reproject.is_some()) {
             renderer.add_history(shot.film_mut(), &self.scene)?;
-            self.chain.tell(shot.film_mut(), &self.scene, settings)?;
+            self.chain.tell(shot.film_mut(), &self.scene, settings, self.reproject)?;
         }
         Ok(shot)
     }
@@ -264,7 +265,9 @@ impl<'a> Stage<'a> {
         let files = args.output_files();
         let first = first_with_layers(&files)?;
         let film = match self.reproject {
-            Some(_) => image::read(first).ok().filter(|film| self.chain.ends_in(film, &self.scene, settings))?,
+            Some(_) => image::read(first)
+                .ok()
+                .filter(|film| self.chain.ends_in(film, &self.scene, settings, self.reproject))?,
             None => finished(first, &self.scene, settings)?,
         };
         (film.metadata.get(FILTERED).map(String::as_str) == args.filter(settings).map(Method::name)).then_some(film)

@@ -41,12 +41,21 @@ impl Estimate {
         let aovs = Aovs::find(film, &Names::new())?;
         let pixels = 0..film.pixels();
         // Where the file has no such layer its head may tell: how noisy the variances themselves are depends on it.
-        let count = pixels.clone().map(|i| aovs.samples(i)).collect::<Option<Vec<_>>>();
+        // Pixels that a file of a part of the picture does not hold have none.
+        let held = |i: usize| if aovs.holds(i) { aovs.samples(i) } else { Some(0.0) };
+        let count = pixels.clone().map(held).collect::<Option<Vec<_>>>();
+        let is_part = !pixels.clone().all(|i| aovs.holds(i));
         let variance = pixels.clone().map(|i| aovs.variance(i)).collect::<Option<Vec<_>>>();
         let m2 = film.picture(Some("m2")).ok().filter(|_| aovs.is_tallow_s()).map(|m2| m2.pixels);
         let noise = match (m2, count, variance) {
             (Some(m2), Some(count), _) => Noise::Samples { m2, count },
             (None, Some(count), Some(variance)) => Noise::Samples { m2: m2_of(&variance, &count), count },
+            (_, None, Some(_)) if is_part => {
+                return Err(
+                    "holds a part of its picture, and not how many samples its pixels have: compare whole pictures"
+                        .to_owned(),
+                );
+            }
             (_, None, Some(variance)) => Noise::SquaredErrors(variance),
             (_, _, None) => return Err(without_noise(film)),
         };
@@ -62,6 +71,9 @@ impl Estimate {
         if (film.width, film.height) != (errors.width, errors.height) {
             return Err(format!("the standard errors are {}x{}, its image is not", errors.width, errors.height));
         }
+        if errors.pixels.iter().flatten().any(|e| *e < 0.0) {
+            return Err("standard errors are negative: take those of its image, not differences".to_owned());
+        }
         let noise = Noise::SquaredErrors(errors.pixels.iter().map(|e| e.map(|e| e * e)).collect());
         Self { width: film.width, height: film.height, mean: mean(film)?, noise, objects: None }.checked()
     }
@@ -69,11 +81,12 @@ impl Estimate {
     fn checked(self) -> Result<Self, String> {
         let finite = |values: &[[f32; 3]]| values.iter().flatten().all(|v| v.is_finite());
         let positive = |values: &[[f32; 3]]| values.iter().flatten().all(|v| v.is_finite() && *v >= 0.0);
-        let broken = self.mean.iter().filter(|m| !m.iter().all(|v| v.is_finite())).count();
-        if broken > 0 {
-            let all = self.mean.len();
+        let is_broken = |m: &[f32; 3]| !m.iter().all(|v| v.is_finite());
+        if let Some(first) = self.mean.iter().position(is_broken) {
+            let (broken, all) = (self.mean.iter().filter(|m| is_broken(m)).count(), self.mean.len());
+            let [x, y] = [first as u32 % self.width, first as u32 / self.width];
             return Err(format!(
-                "{broken} of {all} pixels are NaN or infinite: find the pixels with tallow compare --diff, or render them anew"
+                "{broken} of {all} pixels are NaN or infinite, the first ({x}, {y}): render the image anew"
             ));
         }
         let sound = match &self.noise {
