@@ -42,9 +42,13 @@ impl PipelineCache {
     pub fn new(device: &ash::Device, candidate: &Candidate, folder: Option<PathBuf>) -> Result<Self> {
         let file = folder.map(|folder| folder.join(file_name(candidate)));
         let data = file.as_deref().and_then(read).filter(|data| fits(data, candidate)).unwrap_or_default();
-        let info = vk::PipelineCacheCreateInfo::default().initial_data(&data);
-        // SAFETY: the data came from this driver (file name, checksum, header), and nobody but the user could write them.
-        let raw = unsafe { device.create_pipeline_cache(&info, None) }.at("pipeline cache")?;
+        let create = |data: &[u8]| {
+            let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
+            // SAFETY: the data came from this driver (file name, checksum, header), and nobody but the user could write them.
+            unsafe { device.create_pipeline_cache(&info, None) }
+        };
+        // A driver that refuses what it has written begins anew.
+        let raw = create(&data).or_else(|_| create(&[])).at("pipeline cache")?;
         Ok(Self { raw, file, loaded: checksum(&data) })
     }
 

@@ -9,7 +9,7 @@ use super::ray_query::{self, RayFeatures, RayQueries, Tracing};
 use super::tuning::Tuning;
 use crate::error::{Error, Result};
 use ash::vk::Handle;
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::ffi::{CStr, CString};
 use std::mem::ManuallyDrop;
@@ -282,9 +282,9 @@ impl Inner {
     }
 
     /// # Errors
-    /// [`Error::DeviceLost`] once a loss was noted.
+    /// [`Error::DeviceLost`] once a loss was noted, or work was given up that may still run and use what new work would.
     pub fn answers(&self) -> Result<()> {
-        match self.lost.load(Ordering::SeqCst) {
+        match self.lost.load(Ordering::SeqCst) || self.is_abandoned() {
             false => Ok(()),
             true => Err(Error::DeviceLost("the device was lost, or stopped answering, before: open another".into())),
         }
@@ -397,7 +397,12 @@ fn create_device(
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
     let more = if by_ray_query { &ray_query::EXTENSIONS[..] } else { &[] };
     let names = calibrated.iter().map(|extension| extension.name()).chain(more.iter().copied());
-    let extensions: Vec<_> = names.map(CStr::as_ptr).collect();
+    let mut extensions: Vec<_> = names.map(CStr::as_ptr).collect();
+    // A device that has this extension is opened with it, or not at all.
+    let partial = khr::portability_subset::NAME;
+    // SAFETY: `physical` is of this instance.
+    let offered = unsafe { instance.enumerate_device_extension_properties(physical) }.at("device extensions")?;
+    extensions.extend(offered.iter().any(|e| e.extension_name_as_c_str() == Ok(partial)).then_some(partial.as_ptr()));
     let (mut features, mut of_rays) = (Features::required(), RayFeatures::required());
     features.v12.buffer_device_address = by_ray_query.into();
     // Every device supports it.

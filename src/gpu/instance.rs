@@ -2,7 +2,7 @@
 use super::At;
 use crate::error::{Error, Result};
 use crate::memory;
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
@@ -154,6 +154,9 @@ fn create(entry: &ash::Entry, debug_utils: bool, validation: bool) -> Result<ash
     let mut extensions = Vec::new();
     let mut layers = Vec::new();
     extensions.extend(debug_utils.then_some(ext::debug_utils::NAME.as_ptr()));
+    // Drivers that are Vulkan over another interface, as on macOS, are listed where a program asks for them.
+    let portability = offers(entry, None, khr::portability_enumeration::NAME)?;
+    extensions.extend(portability.then_some(khr::portability_enumeration::NAME.as_ptr()));
     let configurable = validation && offers(entry, Some(VALIDATION_LAYER), ext::layer_settings::NAME)?;
     if validation {
         layers.push(VALIDATION_LAYER.as_ptr());
@@ -164,7 +167,9 @@ fn create(entry: &ash::Entry, debug_utils: bool, validation: bool) -> Result<ash
     // Since July 2024 (pull request 8279) the layers ignore accesses by shaders unless this is switched on.
     let switches = [c"validate_sync", c"syncval_shader_accesses_heuristic"].map(switched_on);
     let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&switches);
+    let flags = vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
     let mut info = vk::InstanceCreateInfo::default()
+        .flags(if portability { flags } else { vk::InstanceCreateFlags::empty() })
         .application_info(&app)
         .enabled_extension_names(&extensions)
         .enabled_layer_names(&layers);

@@ -1,7 +1,7 @@
 //! The loop of a render: it runs the steps until they end, the image is good enough, or the caller has seen enough.
 use super::pace::Pace;
 use super::{Checkpoint, PathRange, Renderer, Step, film, provenance, resume};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, PassTime};
 use crate::image::primaries::REC709;
 use crate::image::{Film, SOFTWARE, Samples};
@@ -87,13 +87,19 @@ impl<'a> Job<'a> {
     /// [`Job::film`] every so often. What the last step brought is told by the returned status alone.
     ///
     /// # Errors
-    /// As [`Renderer::run`] and [`Renderer::resume`], and those of `between`.
+    /// As [`Renderer::run`] and [`Renderer::resume`], and those of `between`; [`Error::Usage`] for a job that has more than one of a
+    /// checkpoint, a pixel, and samples that it carries.
     pub fn run(
         &self,
         frame: &mut FrameResources,
         between: &mut dyn FnMut(&Status) -> Result<ControlFlow<()>>,
     ) -> Result<Status> {
         let renderer = self.renderer;
+        let begins = [self.checkpoint.is_some(), self.pixel.is_some(), self.carries];
+        if begins.iter().filter(|begins| **begins).count() > 1 {
+            let what = "a job has more than one of checkpoint, pixel and carries: each begins with samples of its own";
+            return Err(Error::Usage(what.to_owned()));
+        }
         if let Some(checkpoint) = self.checkpoint {
             renderer.resume(frame, checkpoint)?;
         }

@@ -38,8 +38,8 @@ impl Renderer {
             scene.check()?;
         }
         self.check_effects(scene, change)?;
-        *self.relabelled.get_mut() = true;
         let mut constants = frame_constants(scene, &self.settings)?;
+        *self.relabelled.get_mut() = true;
         if !change.camera {
             constants.camera = self.frame.constants.camera;
         }

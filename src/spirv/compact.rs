@@ -36,7 +36,7 @@ pub fn compact(module: &[u32]) -> Result<Vec<u32>, String> {
 
 /// Whether the operand at `place` of an instruction is an id, not a number nor a part of a text; `None` for instructions that kernels
 /// do not have.
-fn is_id(Instruction { opcode, words }: &Instruction, place: usize) -> Option<bool> {
+pub(super) fn is_id(Instruction { opcode, words }: &Instruction, place: usize) -> Option<bool> {
     Some(match *opcode {
         op::EXTENSION | op::MEMORY_MODEL | op::CAPABILITY => false,
         op::NAME | op::EXT_INST_IMPORT | op::TYPE_INT | op::TYPE_FLOAT => place == 0,

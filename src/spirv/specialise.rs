@@ -2,7 +2,7 @@
 //! they have read, validated and inlined all of it: nine tenths of the path tracer are effects that a simple scene lacks.
 //!
 //! No instruction that computes something is changed, so results keep their bits as far as a driver's own optimisations are exact.
-use super::compact::compact;
+use super::compact::{compact, is_id};
 use super::flow::{self, Flow, Ids, Value, label};
 use super::instruction::{BOUND, HEADER, Instruction, instructions};
 use super::op;
@@ -86,7 +86,11 @@ impl<'a> Specialised<'a> {
             _ => true,
         };
         let words = match *opcode {
-            op::ENTRY_POINT => words.iter().filter(|id| !of_subgroups(id)).copied().collect(),
+            op::ENTRY_POINT => {
+                let is_id = |place| is_id(&Instruction { opcode: *opcode, words }, place) == Some(true);
+                let left = words.iter().enumerate().filter(|&(place, word)| !(is_id(place) && of_subgroups(word)));
+                left.map(|(_, word)| *word).collect()
+            }
             _ => Cow::Borrowed(&words[..]),
         };
         stays.then_some((*opcode, words))

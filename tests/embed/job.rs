@@ -9,7 +9,7 @@ use tallow::image::{self, Film, Samples, WriteOptions};
 use tallow::layout::Camera;
 use tallow::render::settings::Settings;
 use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, StopReason, merge, traces_paths};
-use tallow::scene::{Loaded, Scene};
+use tallow::scene::{Change, Loaded, Scene};
 
 fn scene(change: impl Fn(&mut Settings)) -> Loaded {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
@@ -79,6 +79,34 @@ fn an_engine_renders_to_a_threshold_and_resumes_where_it_was_interrupted() {
         assert!(channels(&part) != channels(&whole), "{policy}: control");
         assert_eq!(whole.primaries.map(|[red, ..]| red), Some([0.64, 0.33]), "Rec. 709");
     }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn a_job_begins_in_one_way() {
+    let gpu = gpu();
+    let scene = scene(|s| s.spp = 2);
+    let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    let job = Job { pixel: Some(5), carries: true, ..Job::new(&renderer) };
+    let error = job.run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap_err().to_string();
+    assert!(error.contains("more than one of checkpoint, pixel and carries"), "{error}");
+    assert_silent(&gpu);
+}
+
+/// What was accumulated is still of the scene that it says.
+#[test]
+fn an_update_that_is_refused_leaves_what_a_film_says() {
+    let gpu = gpu();
+    let mut scene = scene(|s| s.spp = 2);
+    let mut renderer = Renderer::resumable(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let status = Job::new(&renderer).run_to_end(&mut frame).unwrap();
+    let said = |renderer: &Renderer| Job::new(renderer).film(&status).unwrap().metadata;
+    let before = said(&renderer);
+    scene.scene.view.fov = Some(200.0);
+    let change = Change::everything(&scene);
+    assert!(gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change)).is_err());
+    assert_eq!(said(&renderer), before);
     assert_silent(&gpu);
 }
 

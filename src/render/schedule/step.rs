@@ -128,7 +128,8 @@ impl Step {
                 let together = TOGETHER.min(b.samples - 1);
                 let groups = (most / (u64::from(b.pixels) * u64::from(together))).max(1);
                 let samples = first(b.samples.div_ceil(together), groups) * together;
-                let rest = Batch { first_sample: b.first_sample + samples, samples: b.samples - samples, ..b };
+                let rest =
+                    Batch { first_sample: b.first_sample.wrapping_add(samples), samples: b.samples - samples, ..b };
                 (Self::Uniform(Batch { samples, ..b }), Self::Uniform(rest))
             }
             Self::Uniform(b) => {
@@ -180,6 +181,13 @@ mod tests {
             }
             assert_eq!(end, (1 << 33) + 210);
         }
+        let last = Batch { first_pixel: 0, pixels: 1, first_sample: u32::MAX - 3, samples: 64 };
+        let firsts: Vec<u32> = pieces(Step::Uniform(last), 8)
+            .into_iter()
+            .map(|step| if let Step::Uniform(b) = step { b.first_sample } else { 0 })
+            .collect();
+        let expected: Vec<u32> = (0..8).map(|k| (u32::MAX - 3).wrapping_add(8 * k)).collect();
+        assert_eq!(firsts, expected, "the sequence goes on from its start behind its end");
         let sizes = |most| pieces(Step::Listed(list), most).iter().map(Step::paths).collect::<Vec<_>>();
         assert_eq!([sizes(209), sizes(100)], [vec![105, 105], vec![70, 70, 70]]);
         let samples = |step| if let Step::Uniform(b) = step { b.samples } else { 0 };

@@ -9,7 +9,7 @@ const BOOL: u32 = 1;
 const UINT: u32 = 2;
 const CHOICE: u32 = 3;
 const TEN: u32 = 4;
-const TWENTY: u32 = 5;
+const TWENTY: u32 = 36;
 const ENTRY: u32 = 6;
 const BOUND_OF_IDS: u32 = 40;
 const NO_CONTRACTION: u32 = 42;
@@ -200,7 +200,8 @@ fn numbers_are_set_and_computed_with() {
 fn what_only_subgroups_need_goes_with_them() {
     const SHADER: u32 = 1;
     const SHUFFLE: u16 = 345;
-    const VARIABLE: u32 = 33;
+    // The number of the execution model GLCompute: a word of an entry point is an id by its place.
+    const VARIABLE: u32 = 5;
     const NAME_OF_MAIN: u32 = 0x6e69_616d;
     let before = |lanes: bool| {
         let of_lanes: [Line; 4] = [
