@@ -3,8 +3,8 @@
 // Computes the priority of ROWS pixels of a column per thread, a stride apart (they share most of their neighbours, which are a
 // stride apart too), from the pixel statistics and the words of likeness.comp. The priority is the noise of the samples, estimated
 // over the neighbours that look alike, less what a geometry-aware filter will remove. A filter that gathers a share W of its
-// window divides the variance of indirect light, which is all that it filters, by about 1 + W (pixels - 1). The deviation that
-// remains needs samples. While the noise is unknown, geometry alone decides.
+// window is taken to remove the share `filtered` * W of the variance of indirect light, which is all that it filters. The deviation
+// that remains needs samples. While the noise is unknown, geometry alone decides.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 1) uniform usamplerBuffer words; // of float

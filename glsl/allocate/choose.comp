@@ -2,9 +2,8 @@
 #include "shared/pcg.glsl"
 
 // Gives one pixel per thread one sample or none (Schalk 2018, algorithm 1). While there is a threshold, pixels whose priority
-// reaches it get a sample; without one, the priority is the probability of a sample. Departure from the paper, where a
-// priority must exceed the threshold: here it may equal it, since an unknown pixel has priority 1, which is the first
-// threshold, and must get its sample.
+// reaches it get a sample; without one, the priority is the probability of a sample. As in the algorithm's listing, and not as its
+// text says, a priority may equal the threshold: an unknown pixel has priority 1, which is the first threshold, and must get its sample.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer priority; // of float
 layout(scalar, binding = 1) writeonly buffer Counts { uint count[]; };

@@ -14,11 +14,12 @@ layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
 const uint INITIAL_SAMPLES = 4u;
 
-// The weight w is a share of all samples past and next: max(0, floor(total * w / W) - count), W the sum of the weights.
+// The weight w is a share of all samples past and next, W the sum of the weights: max(0, floor(PARTS * total * w / W) - PARTS * count)
+// parts of a sample.
 uint lack_of_share(Proportion share_of, uint w, uint have) {
-    uint64_t share, rest;
+    uint64_t share, rest, parts = uint64_t(PARTS) * have;
     multiply_divide(share_of, w, share, rest);
-    return share > have ? uint(min(share - have, 0xffffffffUL)) : 0u;
+    return share > parts ? uint(min(share - parts, 0xffffffffUL)) : 0u;
 }
 
 // The weight w is an error. That of a mean of n samples is w / sqrt(n), so that ceil((w / t)^2) - n are lacking for the threshold t. The

@@ -2,6 +2,10 @@
 #include "shared/last_block.glsl"
 #include "shared/proportion.glsl"
 
+// Parts of a sample in which pixels lack samples of their share: in whole ones, rounds of few samples would not tell pixels apart, and
+// those at the top of the film would get them.
+const uint PARTS = 64u;
+
 // To be called by all threads with the sums of their block; the last workgroup does it. `again`: after the weights were replaced by what
 // pixels lack.
 void start_apportionment(BlockSums sum, bool again) {
@@ -19,7 +23,7 @@ void start_apportionment(BlockSums sum, bool again) {
     Apportionment s = state[0];
     s.equal = weights == 0UL ? 1u : 0u; // no pixel has a weight: all share alike
     bool deficit_next = !again && push.total != uvec2(0u);
-    uint64_t budget = join64(deficit_next ? push.total : push.budget);
+    uint64_t budget = deficit_next ? PARTS * join64(push.total) : join64(push.budget);
     if (again && push.threshold != 0u) budget = min(budget, weights); // not more than all pixels lack
     set_proportion(s, budget, weights == 0UL ? uint64_t(push.pixels) : weights);
     if (!again) { // the counts of quantise_priority.comp

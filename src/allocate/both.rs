@@ -34,7 +34,7 @@ settings! {
     pub struct BothSettings {
         /// The settings of [`BothSettings`] that are given; the others are `None`.
         BothOverrides {
-            /// Share of the variance that a filter will remove where neighbours are alike; 0 is none.
+            /// Share of the variance that a filter will remove where neighbours are alike; 0 is none, as with a noise threshold.
             filtered: f32 = 0.5, 0.0..=1.0;
         }
     }

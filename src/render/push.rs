@@ -13,12 +13,13 @@ pub fn priority_push(scene: &Scene, s: &Settings) -> PriorityPush {
     PriorityPush {
         size: [s.width, s.height],
         window: a.geometry.window,
-        normal_scale: a.geometry.sigma_normal.powi(-2),
+        normal_scale: a.geometry.sigma_normal.max(f32::MIN_POSITIVE.sqrt()).powi(-2),
         position_scale: sigma.powi(-2),
         luminance_floor: a.variance.luminance_floor,
         limit: schedule::limit(s),
         threshold: a.noise_threshold,
-        filtered: a.both.filtered,
+        // A threshold is of the samples' own error: less what a filter removes, pixels would stop above it.
+        filtered: if a.noise_threshold > 0.0 { 0.0 } else { a.both.filtered },
         round: 0,
         stride: s.indirect_stride,
         ..Default::default()
@@ -52,5 +53,30 @@ fn path_constants(scene: &Scene, settings: &Settings) -> PathConstants {
         environment_size: scene.environment.as_ref().map_or([0; 2], |e| [e.width, e.height]),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..Default::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_threshold_is_of_the_samples_own_error() {
+        let mut settings = Settings::default();
+        let filtered = |settings: &Settings| priority_push(&Scene::default(), settings).filtered;
+        assert_eq!(filtered(&settings), 0.5);
+        settings.allocate.noise_threshold = 0.02;
+        assert_eq!(filtered(&settings), 0.0);
+    }
+
+    /// Its square is no number of single precision: normals that are equal would be unlike.
+    #[test]
+    fn the_smallest_deviations_have_a_scale() {
+        let mut settings = Settings::default();
+        settings.allocate.geometry.sigma_normal = 1e-30;
+        settings.allocate.geometry.sigma_position = 1e-30;
+        settings.validate().unwrap();
+        let push = priority_push(&Scene::default(), &settings);
+        assert!(push.normal_scale.is_finite() && push.position_scale.is_finite(), "{push:?}");
     }
 }

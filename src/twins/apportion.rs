@@ -4,6 +4,7 @@ use crate::layout::NONE;
 use crate::math::hash::pcg;
 use crate::shaders::lack::INITIAL_SAMPLES;
 use crate::shaders::quantise_priority::{FIXED_POINT, MAX_PRIORITY};
+use crate::shaders::shared::start_apportionment::PARTS;
 
 /// Priorities as 12.20 fixed point, and the number of those that are not finite, whose weight is 0.
 pub fn weigh(priority: &[f32]) -> (Vec<u32>, u32) {
@@ -23,14 +24,15 @@ pub fn choose(priority: &[f32], round: u32, seed: u32, threshold: f32) -> Vec<u3
     priority.iter().enumerate().map(chosen).map(u32::from).collect()
 }
 
-/// Samples that pixels lack of their shares of `total` samples: max(0, floor(total * w / W) - have).
+/// What pixels lack of their shares of `total` samples, in [`PARTS`] of a sample: max(0, floor(PARTS total w / W) - PARTS have).
 pub fn deficit(weights: &[u32], have: &[u32], total: u64) -> Vec<u32> {
     let sum: u128 = weights.iter().map(|&w| u128::from(w)).sum();
+    let parts = |samples: u128| u128::from(PARTS) * samples;
     let share = |w: u32| match sum {
-        0 => u128::from(total) / weights.len() as u128,
-        sum => u128::from(total) * u128::from(w) / sum,
+        0 => parts(total.into()) / weights.len() as u128,
+        sum => parts(total.into()) * u128::from(w) / sum,
     };
-    let lack = |(&w, &have): (&u32, &u32)| share(w).saturating_sub(u128::from(have)).min(u128::from(u32::MAX)) as u32;
+    let lack = |(&w, &have): (&u32, &u32)| share(w).saturating_sub(parts(have.into())).min(u128::from(u32::MAX)) as u32;
     weights.iter().zip(have).map(lack).collect()
 }
 
@@ -124,6 +126,19 @@ mod tests {
 
     const ROOM: [u32; 4] = [1000; 4];
 
+    /// Rounds of one sample in all give each pixel one, and weights of nearly one size as many to all.
+    #[test]
+    fn small_rounds_are_spread_as_weights_say() {
+        let (mut have, room) = ([1; 64], [u32::MAX; 64]);
+        for total in 65..=128 {
+            let next = apportion(&deficit(&[1 << 20; 64], &have, total), &room, 1, 1);
+            have.iter_mut().zip(next).for_each(|(have, next)| *have += next);
+        }
+        assert_eq!(have, [2; 64]);
+        let uneven: Vec<u32> = (0..64).map(|i| if i % 2 == 0 { 1010 } else { 990 }).collect();
+        assert_eq!(apportion(&deficit(&uneven, &[2; 64], 256), &room, 128, 1), [2; 64]);
+    }
+
     #[test]
     fn hamilton_s_worked_example() {
         // 10 by 5 : 3 : 2 : 1 of 11: quotas 4.54, 2.72, 1.81, 0.90; floors 4 2 1 0, three left to .90, .81 and .72.
@@ -154,8 +169,8 @@ mod tests {
 
     #[test]
     fn shares_are_less_what_is_there() {
-        assert_eq!(deficit(&[3, 1, 0], &[2, 5, 1], 8), [4, 0, 0]);
-        assert_eq!(deficit(&[0, 0], &[1, 0], 5), [1, 2]);
+        assert_eq!(deficit(&[3, 1, 0], &[2, 5, 1], 8), [4 * PARTS, 0, 0]);
+        assert_eq!(deficit(&[0, 0], &[1, 0], 5), [3 * PARTS / 2, 5 * PARTS / 2]);
         // (w / t)^2: 4, 6.25 (7), 100; the third has 9 and may double, the fourth has 18 of 20; the fifth has enough,
         // the sixth too, but still lacks one, since its weight shows that its error is above the threshold.
         assert_eq!(need(&[4, 5, 20, 20, 0, 2], &[1, 1, 9, 18, 3, 5], 2, 20), [3, 4, 9, 2, 0, 1]);

@@ -16,6 +16,6 @@ settings! {
 }
 
 impl FootprintSettings {
-    /// The most levels of a wavelet filter; the footprint of so many is 5 * 2^levels pixels wide.
+    /// The most levels of a wavelet filter; the footprint of so many is 4 * 2^levels - 3 pixels wide.
     pub const MAX_LEVELS: u32 = 10;
 }

@@ -34,7 +34,7 @@ pub enum Share {
     /// Shares of all samples: those that pixels have and those to place, together so many.
     All(u64),
     /// As many samples n as bring priority / sqrt(n), the error of the mean, below the threshold, but no more than
-    /// `limit` in all, nor than double: what is known of the noise comes from the samples there are.
+    /// `limit` in all, nor than double, or 4: what is known of the noise comes from the samples there are.
     Need {
         /// Above 0.
         threshold: f32,
