@@ -91,6 +91,15 @@ fn atrous_solves_the_worked_example() {
 }
 
 #[test]
+fn what_is_no_number_is_far_from_all_others() {
+    let [none, one] = [[[f32::NAN; 4]], [[1.0; 4]]];
+    assert_eq!(
+        [apart(&none, &one, 1.0), apart(&one, &none, 1.0), apart(&one, &one, 1.0)],
+        [f32::INFINITY, f32::INFINITY, 0.0]
+    );
+}
+
+#[test]
 fn fireflies_are_cut_and_accounted_for() {
     let gpu = gpu();
     // A lone 9 over a floor of 1 is cut to twice that; two together keep each other.
