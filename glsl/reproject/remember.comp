@@ -109,7 +109,7 @@ uint kept_by_spread(uint pixel, vec3 plane, uint count, bool edge, out float noi
         uint other = uint(q.y * size.x + q.x);
         if (!edge && k >= 9 && !shows_same(pixel, other, plane, width)) continue;
         PixelStats s = PixelStats_load(stats, other);
-        if (s.count == 0u) continue;
+        if (s.count == 0u) continue; // it is not black, but unknown
         vec3 off = s.mean - origin;
         n += 1.0;
         sum += off;

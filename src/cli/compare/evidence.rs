@@ -28,13 +28,12 @@ pub fn check(folder: &Path) -> Result<()> {
 /// The files that [`write`] makes of these images. One that is the image itself is not among them: it stays as it is.
 pub fn files(folder: &Path, images: [&Path; 2]) -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = VIEWS.iter().map(|name| folder.join(name)).collect();
-    let copies = NAMES.iter().zip(images).map(|(name, image)| (copy_of(folder, name, image), image));
-    all.extend(
-        copies
-            .filter(|(copy, image)| key(copy) != key(image) && !all.contains(copy))
-            .map(|(copy, _)| copy)
-            .collect::<Vec<_>>(),
-    );
+    for (name, image) in NAMES.iter().zip(images) {
+        let copy = copy_of(folder, name, image);
+        if key(&copy) != key(image) && !all.contains(&copy) {
+            all.push(copy);
+        }
+    }
     all
 }
 

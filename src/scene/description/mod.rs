@@ -87,8 +87,8 @@ pub struct EnvironmentTable {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshTable {
-    /// Name by which instances and animations call it, which they cannot without, but for a glTF file's own; reports take the file's or
-    /// the shape's then.
+    /// Name by which instances and animations call it; meshes of glTF files have one of their own. Reports take the file's name or the
+    /// shape's where there is none.
     pub name: Option<String>,
     /// Path of an OBJ file, of a PLY file (`.ply`, `.ply.gz`), or of a glTF file, whose meshes, lights and what moves them take the
     /// place of this table.

@@ -28,8 +28,7 @@ pub struct Materials {
 /// Marks thin walls without a coat that are smooth, or whose picture may make them so: shadow rays of lights without extent pass
 /// where they are.
 pub fn mark_clear_wall(m: &mut Material) {
-    let pictured = m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.roughness_texture != NONE;
-    let clear = (is_smooth_wall(m) || pictured) && m.clearcoat == 0.0;
+    let clear = (is_smooth_wall(m) || is_wall(m) && m.roughness_texture != NONE) && m.clearcoat == 0.0;
     m.flags = m.flags & !MATERIAL_CLEAR_WALL | if clear { MATERIAL_CLEAR_WALL } else { 0 };
 }
 
@@ -41,7 +40,12 @@ pub fn is_masked(m: &Material) -> bool {
 
 /// Whether it is a thin wall that lets light straight through.
 pub fn is_smooth_wall(m: &Material) -> bool {
-    m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA
+    is_wall(m) && m.alpha < SMOOTH_ALPHA
+}
+
+/// Whether it is a thin wall that light passes.
+fn is_wall(m: &Material) -> bool {
+    m.kind == BSDF_METALLIC && m.transmission_factor > 0.0
 }
 
 impl Materials {

@@ -98,11 +98,8 @@ fn check(header: &Header, size: u64) -> Checked {
         }
     }
     let Some(vertex) = header.elements.get("vertex") else { return Err("has no vertices: is it a mesh?".into()) };
-    if header
-        .elements
-        .get("face")
-        .is_some_and(|face| face.count > 0 && !face.properties.keys().any(|name| is_corners(name)))
-    {
+    let lacks_corners = |face: &ElementDef| face.count > 0 && !face.properties.keys().any(|name| is_corners(name));
+    if header.elements.get("face").is_some_and(lacks_corners) {
         return Err("its faces have no vertex_indices: save it again as PLY 1.0".into());
     }
     let missing = ["x", "y", "z"].into_iter().find(|axis| !has(vertex, &[axis]));

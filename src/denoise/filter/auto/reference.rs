@@ -136,11 +136,11 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     };
     let planes: [Vec<Vec4>; 3] = from_fn(|k| (0..image.len()).map(|i| errors(i)[k]).collect());
     let planes = planes.map(|plane| smoothed(plane, true));
-    let relative = |i: usize| planes.each_ref().map(|plane| plane[i]);
+    let found_around = |i: usize| planes.each_ref().map(|plane| plane[i]);
     let weights = |i: usize| {
         let (enough, [a, b, c, d]) = (image[i].count >= ENOUGH, results.usable(i));
         let usable = [enough, a, b, c, image[i].count >= ENOUGH_FOR_SVGF && d];
-        (usable, least_square(&matrix(relative(i)), usable))
+        (usable, least_square(&matrix(found_around(i)), usable))
     };
     let weights: Vec<_> = (0..image.len()).map(weights).collect();
     let blended = |i: usize| {
@@ -150,8 +150,9 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
         own.map_or(all, |variance| less_of_one_sample(&image[i], variance, all, filtered[3]))
     };
     let blend: Vec<Vec4> = (0..image.len()).map(blended).collect();
-    let expected =
-        |i: usize| expected(relative(i), &weights[i].1, [results.leverages[i], surroundings[i]], shares_of_noise[i]);
+    let expected = |i: usize| {
+        expected(found_around(i), &weights[i].1, [results.leverages[i], surroundings[i]], shares_of_noise[i])
+    };
     let expected = (0..image.len()).map(expected).collect();
     let prior = |i: usize| {
         let level = contrast(blend[i].xyz(), Vec3::ZERO).abs().max(floor);

@@ -165,6 +165,7 @@ impl Reader<'_> {
         }
         if let Some(found) = self.extension::<Ior>(all, "KHR_materials_ior")? {
             let [ior] = self.between("ior", [found.ior], [1.0, LARGEST_INDEX]);
+            // An index of 0 says that all is reflected.
             table.ior = Some(if found.ior == 0.0 { 0.0 } else { ior });
         }
         if let Some(found) = self.extension::<Specular>(all, "KHR_materials_specular")? {
