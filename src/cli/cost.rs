@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{self, Gpu};
 use crate::scene::{Scene, SceneFile};
 pub use options::Args;
-use output::{Folder, Shown, text};
+use output::{Folder, Shown, missing, text};
 use points::Points;
 use serde::Serialize;
 use std::path::Path;
@@ -116,7 +116,7 @@ fn finish(
     runs_before: usize,
     warnings: &[String],
 ) -> Result<Exit> {
-    if ended == Ended::Stopped && runs(&document) == runs_before {
+    if ended == Ended::Stopped && runs(&document) == runs_before && missing(&document) > 0 {
         complain("interrupted before a run was complete: nothing was written");
         return Ok(Exit::Interrupted);
     }

@@ -55,29 +55,18 @@ pub fn lacks_runs(point: &Point, repeats: u32) -> bool {
     !point.is_other && point.failed.is_none() && point.runs.len() < repeats as usize
 }
 
-/// The document of what was measured so far, and how that ended.
-pub fn document(
-    outline: &Outline,
-    mut points: Vec<Point>,
-    reference: &Reference,
-    is_stopped: bool,
-) -> (Document, Ended) {
-    let repeats = outline.seeds.len() as u32;
-    let ended = match (points.iter().any(|point| lacks_runs(point, repeats)), is_stopped) {
-        (false, _) => Ended::Complete,
-        (true, true) => Ended::Stopped,
-        (true, false) => Ended::Budget,
-    };
+/// The document of what was measured so far. Complete is what has all its runs, its pictures, and its page.
+pub fn document(outline: &Outline, mut points: Vec<Point>, reference: &Reference, complete: bool) -> Document {
     summarise(&mut points);
-    let document = Document {
+    Document {
         schema: SCHEMA,
-        complete: ended == Ended::Complete,
+        complete,
         software: machine::software(),
         scene: outline.scene.clone(),
         machine: outline.machine.clone(),
         reference: reference.info.clone(),
         measurement: Measurement {
-            repeats,
+            repeats: outline.seeds.len() as u32,
             seeds: outline.seeds.clone(),
             order_seed: outline.order_seed,
             budget_minutes: outline.budget.map(|budget| budget.as_secs_f64() / 60.0),
@@ -87,8 +76,7 @@ pub fn document(
         front: front(&points),
         findings: findings(&points),
         points,
-    };
-    (document, ended)
+    }
 }
 
 /// The pictures of the points that have one, and the reference.

@@ -9,6 +9,7 @@ const NAMED: usize = 3;
 /// Factors of the runs of a point relative to those of the same seed without its options, as logarithms.
 struct Factors {
     time: Vec<f64>,
+    /// Empty where one is unknown: the others alone would be biased.
     error: Vec<f64>,
 }
 
@@ -35,16 +36,16 @@ fn factors(point: &Point, plain: &Point) -> Option<Factors> {
         let error = run.errors.relmse.zip(before.errors.relmse).map(|(now, before)| (now / before).ln());
         all.error.extend(error.filter(|logarithm| logarithm.is_finite()));
     }
+    if all.error.len() < all.time.len() {
+        all.error.clear();
+    }
     (!all.time.is_empty() && point.failed.is_none()).then_some(all)
 }
 
 impl Factors {
     /// Of relMSE times time; empty where an error is unknown.
     fn product(&self) -> Vec<f64> {
-        match self.time.len() == self.error.len() {
-            true => self.time.iter().zip(&self.error).map(|(t, e)| t + e).collect(),
-            false => Vec::new(),
-        }
+        self.time.iter().zip(&self.error).map(|(t, e)| t + e).collect()
     }
 }
 

@@ -183,9 +183,10 @@ fn goal(candidates: &[Candidate], error: f64, alpha: f64) -> Option<Finding> {
     let ranking = ranking(candidates, [&reaches, &|c| !reaches(c)], [&read, &read], alpha);
     let fastest = &candidates[*ranking.best.first()?];
     let times: Vec<f64> = fastest.curves.values().map(read).collect();
-    let Estimate { value, low, high } = interval::geometric_mean(&times, CONFIDENCE);
-    let between = low.zip(high).map(|(l, h)| format!(" ({} to {})", milliseconds(l), milliseconds(h)));
-    let text = format!("relMSE {} takes {}{}", number(error), milliseconds(value), between.unwrap_or_default());
+    let time = interval::geometric_mean(&times, CONFIDENCE);
+    let between = time.interval(milliseconds).map(|between| format!(" ({between})"));
+    let text = format!("relMSE {} takes {}{}", number(error), milliseconds(time.value), between.unwrap_or_default());
+    let clear: fn(String) -> Finding = if time.is_vague() { noisy } else { clear };
     let mut finding = match ranking.best[..] {
         [_] if candidates.len() == 1 => clear(format!("{text} with {}.", fastest.name)),
         [_] => with_open(candidates, &ranking, format!("{text} with {}, the fastest", fastest.name), clear),

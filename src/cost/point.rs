@@ -136,8 +136,15 @@ impl Estimate {
     /// Both ends of the interval in words; `None` without one. Ends that are a factor of 1000 apart tell not even a magnitude.
     pub fn interval(&self, number: fn(f64) -> String) -> Option<String> {
         let (low, high) = self.low.zip(self.high)?;
-        let is_vague = low > 0.0 && high > 1000.0 * low;
-        Some(if is_vague { "too few runs to tell".to_owned() } else { format!("{} to {}", number(low), number(high)) })
+        Some(match self.is_vague() {
+            true => "too few runs to tell".to_owned(),
+            false => format!("{} to {}", number(low), number(high)),
+        })
+    }
+
+    /// Whether the ends of the interval are a factor of 1000 apart.
+    pub fn is_vague(&self) -> bool {
+        self.low.zip(self.high).is_some_and(|(low, high)| low > 0.0 && high > 1000.0 * low)
     }
 }
 

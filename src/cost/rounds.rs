@@ -68,9 +68,18 @@ impl<R: Runs> Measuring<'_, R> {
     /// Makes the runs that are missing, each judged against `reference`.
     pub fn finish(mut self, reference: &Reference) -> (Document, Images, Ended) {
         self.rounds(reference);
-        self.missing_pictures();
-        let (document, ended) = document(&self.outline, self.points, reference, (self.watch.stop)());
+        let ended = match (self.has_all_runs() && self.make_missing_pictures(), (self.watch.stop)()) {
+            (true, _) => Ended::Complete,
+            (false, true) => Ended::Stopped,
+            (false, false) => Ended::Budget,
+        };
+        let document = document(&self.outline, self.points, reference, ended == Ended::Complete);
         (document, images(self.pictures, reference), ended)
+    }
+
+    fn has_all_runs(&self) -> bool {
+        let repeats = self.outline.seeds.len() as u32;
+        !self.points.iter().any(|point| lacks_runs(point, repeats))
     }
 
     fn rounds(&mut self, reference: &Reference) {
@@ -96,9 +105,7 @@ impl<R: Runs> Measuring<'_, R> {
                 let done = self.points[..ours].iter().map(|point| point.runs.len() as u64).sum();
                 (self.watch.progress)("runs", done, (ours * seeds.len()) as u64);
             }
-            // Complete is what has its pictures and its page as well.
-            let (so_far, _) = document(&self.outline, self.points.clone(), reference, true);
-            (self.watch.keep)(&Document { complete: false, ..so_far });
+            (self.watch.keep)(&document(&self.outline, self.points.clone(), reference, false));
         }
     }
 
@@ -134,21 +141,28 @@ impl<R: Runs> Measuring<'_, R> {
         }
     }
 
-    /// Pictures of points whose first runs were made before this program was started.
-    fn missing_pictures(&mut self) {
-        let seeds = &self.outline.seeds;
-        let Some(&seed) = seeds.first() else { return };
-        if self.points.iter().any(|point| lacks_runs(point, seeds.len() as u32)) {
-            return;
-        }
-        for (group, mut points) in self.runs.groups().into_iter().enumerate() {
+    /// Makes the pictures of points whose first runs were made before this program was started. Returns false if it was stopped before.
+    fn make_missing_pictures(&mut self) -> bool {
+        let Some(&seed) = self.outline.seeds.first() else { return true };
+        let mut groups: Vec<_> = self.runs.groups().into_iter().enumerate().collect();
+        for (_, points) in &mut groups {
             points.retain(|&i| self.pictures[i].is_none() && self.points[i].failed.is_none());
-            if points.is_empty() || (self.watch.stop)() {
-                continue;
+        }
+        groups.retain(|(_, points)| !points.is_empty());
+        for (done, (group, points)) in groups.iter().enumerate() {
+            // Not at the end of its time: what is made is kept nowhere, and would be begun anew each time.
+            if (self.watch.stop)() {
+                return false;
             }
-            for (point, result) in self.runs.run(group, seed, &points, self.watch.stop) {
+            (self.watch.progress)("pictures", done as u64, groups.len() as u64);
+            let outcome = self.runs.run(*group, seed, points, self.watch.stop);
+            if outcome.is_empty() {
+                return false;
+            }
+            for (point, result) in outcome {
                 self.pictures[point] = result.ok().map(|found| found.picture);
             }
         }
+        true
     }
 }

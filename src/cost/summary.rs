@@ -111,7 +111,8 @@ fn of_all(runs: &[Run], of: impl Fn(&Run) -> Option<f64>) -> Option<Vec<f64>> {
     runs.iter().map(of).collect()
 }
 
-/// A factor of every run relative to the curve of its own seed, without rises, and the geometric mean of these factors. Uniform
+/// A factor of every run relative to the curve of its own seed, without rises, and the geometric mean of these factors. Runs of another
+/// renderer, whose seeds may be others, stand beside the curves in their order (see [`super::candidate::Candidate::against`]). Uniform
 /// unfiltered rendering is as good as itself. Runs without an error above the noise of the reference tell no factor, and the others
 /// alone would be biased.
 fn factor(point: &Point, baseline: &Baseline, of: impl Fn(&Curve, &Run, f64) -> Reading) -> Option<Factor> {
@@ -121,8 +122,13 @@ fn factor(point: &Point, baseline: &Baseline, of: impl Fn(&Curve, &Run, f64) -> 
             extrapolated: false,
         });
     }
-    let reading = |run: &Run| Some(of(&baseline.get(&run.seed)?.falling(), run, run.errors.relmse?));
-    let readings: Vec<Reading> = point.runs.iter().filter_map(reading).collect();
+    let of_seed = point.runs.iter().filter_map(|run| Some((run, baseline.get(&run.seed)?)));
+    let mut pairs: Vec<(&Run, &Curve)> = of_seed.collect();
+    if pairs.len() < 2 {
+        pairs = point.runs.iter().zip(baseline.values()).collect();
+    }
+    let reading = |(run, curve): &(&Run, &Curve)| Some(of(&curve.falling(), run, run.errors.relmse?));
+    let readings: Vec<Reading> = pairs.iter().filter_map(reading).collect();
     if readings.is_empty() || point.ends_at_0() {
         return None;
     }

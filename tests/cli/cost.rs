@@ -122,7 +122,11 @@ fn tables(folder: &TempDir, document: &Document) {
 #[test]
 fn an_ablation_turns_every_knob_by_itself() {
     let folder = tempfile::tempdir().unwrap();
-    let printed = text(&cost(&folder, "--ablate --allocate uniform --denoise none --spp 16 --repeats 2 -o all"), 0);
+    let words =
+        format!("cost {} {FILM} --ablate --allocate uniform --denoise none --spp 16 --repeats 2 -o all", scene());
+    let mut command = within(&folder, &words);
+    // A step that is asked for as a variant as well is one point.
+    let printed = text(&command.args(["--variant", "--max-depth 2"]).output().unwrap(), 0);
     assert!(printed.contains("factors by options"), "{printed}");
     let document = document(&folder, "all/cost.json");
     let change = |option: &str| {
@@ -193,11 +197,18 @@ fn what_is_missing_is_completed_and_nothing_else_is_measured_again() {
     assert_eq!(again.points[1].runs[2].errors, whole.points[1].runs[2].errors);
     assert_ne!(again.points[1].runs[2].gpu_ms, whole.points[1].runs[2].gpu_ms, "control: this one was measured");
     assert!(pictures(&folder) == shown, "all points are shown with their first seed");
+    // What lacks nothing but its pictures gets them, whatever its time.
+    write(&Document { complete: false, ..again.clone() });
+    text(&better(&format!("{words} --budget-minutes 0.000001")), 0);
+    let finished = document(&folder, "all/cost.json");
+    assert!(finished.complete && pictures(&folder) == shown);
+    let all_runs = |document: &Document| document.points.iter().map(|point| point.runs.clone()).collect::<Vec<_>>();
+    assert!(all_runs(&finished) == all_runs(&again));
     // Another measurement begins anew, and does not replace a whole one by a part.
     let other = "--allocate uniform --denoise none --spp 1,2 --repeats 4 -o all --budget-minutes 0.000001";
     let printed = text(&cost(&folder, other), 0);
     assert!(printed.contains("not complete: 8 runs are missing") && printed.contains("cost.partial.json"), "{printed}");
-    assert_eq!(document(&folder, "all/cost.json"), again);
+    assert_eq!(document(&folder, "all/cost.json"), finished);
 }
 
 #[test]

@@ -101,6 +101,18 @@ fn the_same_images_under_two_names_have_no_winner() {
     assert!(winners(&found).iter().all(|text| text.contains("twin")) && !winners(&found).is_empty(), "{found:#?}");
 }
 
+/// Times that may be a thousand times as long or as short are no finding.
+#[test]
+fn times_of_no_magnitude_are_told_as_such() {
+    let of = |error: f64| findings(&points(&[UNIFORM], Spread { time: 0.01, error }, false, 3));
+    let times = |f: &&Finding| f.text.starts_with("relMSE ") && f.text.contains(" takes ");
+    let (vague, sharp) = (of(6.0), of(0.1));
+    assert!(sharp.iter().filter(times).count() > 0, "control: {sharp:#?}");
+    assert!(sharp.iter().filter(times).all(|f| f.verdict == Verdict::Clear && f.text.contains(" to ")), "{sharp:#?}");
+    let vague: Vec<_> = vague.iter().filter(times).filter(|f| f.text.contains("too few runs to tell")).collect();
+    assert!(!vague.is_empty() && vague.iter().all(|f| f.verdict == Verdict::TooNoisy), "{vague:#?}");
+}
+
 #[test]
 fn ties_are_said_to_be_ties() {
     let twin = Truth { allocate: "twin", ..UNIFORM };
@@ -195,6 +207,15 @@ fn methods_that_share_no_seed_are_compared_all_the_same() {
     let named = winners(&found);
     assert!(!named.is_empty() && named.iter().all(|text| text.contains("uniform")), "{found:#?}");
     assert!(found.iter().all(|f| !f.text.contains("cannot tell between")), "{found:#?}");
+    // Its factors are of all its runs, too, whether no seed is shared or one.
+    for seeds in [[100, 101, 102, 103, 104], [0, 101, 102, 103, 104]] {
+        for point in &mut points[4..] {
+            point.runs.iter_mut().zip(seeds).for_each(|(run, seed)| run.seed = seed);
+        }
+        summarise(&mut points);
+        let gain = points[5].summary.as_ref().unwrap().error_gain.unwrap().estimate;
+        assert!((0.08..0.12).contains(&gain.value) && gain.low < gain.high && gain.low.is_some(), "{gain:?}");
+    }
 }
 
 #[test]
@@ -206,6 +227,8 @@ fn an_option_of_a_point_without_error_is_left_open() {
         let found = findings(&points);
         let is_open = |f: &Finding| f.verdict == Verdict::TooNoisy && f.text.contains("gains by depth 4 the data");
         assert!(found.iter().any(is_open), "{found:#?}");
+        let change = points[1].summary.as_ref().unwrap().change.unwrap();
+        assert!(change.time.is_some() && change.relmse.is_none() && change.product.is_none(), "{change:?}");
     }
 }
 

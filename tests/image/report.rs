@@ -88,6 +88,16 @@ fn times_of_few_runs_have_ranges_and_no_intervals() {
         ["2 runs of each point, 95 % intervals of errors and factors, ranges of times", "those of times are the range"];
     says(2, &ranges, &["Bars are 95 %", "% intervals<"]);
     says(6, &["6 runs of each point, 95 % intervals<", "Bars are 95 % intervals."], &["range"]);
+    // Another renderer's few runs, and those of a point that failed, are no reason to call ours a range.
+    let other = document.points.iter_mut().rfind(|point| !point.runs.is_empty()).unwrap();
+    (other.is_other, other.failed) = (true, None);
+    other.runs.truncate(2);
+    let with_other = page(&document);
+    assert!(content(&with_other).contains("6 runs of each point, 95 % intervals<"));
+    assert!(content(&with_other).contains("those of times of other renderers are the range"));
+    let failed = document.points.iter_mut().rfind(|point| point.is_other).unwrap();
+    (failed.is_other, failed.failed) = (false, Some("it failed".to_owned()));
+    assert!(content(&page(&document)).contains("Bars are 95 % intervals."));
 }
 
 #[test]

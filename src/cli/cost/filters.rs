@@ -8,6 +8,7 @@ use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::image;
 use clap::Parser;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Measures filters on an image.
@@ -48,7 +49,9 @@ fn candidates(args: &Args, image: &Path) -> Result<Vec<FilterCandidate>> {
             return Err(Error::Usage(format!("\"{}\" changes no filter of the list", variant.trim())));
         }
     }
-    Ok(plain.into_iter().chain(varied).collect())
+    let mut known = BTreeSet::new();
+    let all = plain.into_iter().chain(varied);
+    Ok(all.filter(|candidate| known.insert((candidate.filter.name(), candidate.options.clone()))).collect())
 }
 
 fn candidate(image: &Path, filter: Method, [shared, variant]: [&str; 2]) -> Result<FilterCandidate> {
@@ -98,6 +101,8 @@ mod tests {
     fn what_changes_nothing_is_no_other_point() {
         let all = made(&["--denoise", "none,atrous", "--variant", "--levels 3"]).unwrap();
         assert_eq!(all, ["none", "atrous", "atrous --levels 3"], "nothing is filtered by none");
+        let doubled = ["--denoise", "none,atrous,atrous", "--variant", "--levels 3", "--variant", "--levels 3"];
+        assert_eq!(made(&doubled).unwrap(), all);
         for words in [
             ["--denoise", "none", "--with", "", "--variant", "--levels 3"],
             ["--denoise", "none,atrous", "--with", "--levels 3", "--variant", "--levels 3 "],

@@ -72,12 +72,26 @@ impl Folder {
         let mut files = self.files.borrow_mut();
         let page = html::cost(document, Some(images)).into_bytes();
         let contents = [json(document), table::csv(document), page];
-        let items: Vec<_> =
+        let mut items: Vec<_> =
             NAMES.iter().zip(contents).map(|(name, bytes)| Item::bytes(self.path.join(name), bytes)).collect();
-        let written = files.save(&items, whole);
-        if whole && files.check().is_ok() {
-            files.remove_partial(&items);
+        if whole {
+            let written = files.save(&items, whole);
+            if files.check().is_ok() {
+                files.remove_partial(&items);
+            }
+            return written;
         }
+        let mut written = files.save(&items[..1], whole);
+        let place = written.first().filter(|place| place.parent() == Some(&self.path) && **place != items[0].path);
+        if let Some(place) = place {
+            // Table and page have the document's number, by which they are found again.
+            for item in &mut items[1..] {
+                let beside = place.with_extension(item.path.extension().unwrap_or_default());
+                item.path = partial_name(&item.path);
+                files.go_on(&item.path, beside);
+            }
+        }
+        written.extend(files.save(&items[1..], whole));
         written
     }
 
@@ -179,9 +193,10 @@ pub fn text(document: &Document, written: &[PathBuf]) -> String {
     text += "\n";
     text.extend(document.reference.notes.iter().map(|note| format!("{}\n", readable(note))));
     text.extend(document.findings.iter().map(|finding| format!("{}\n", readable(&finding.text))));
-    let missing: usize = document.points.iter().map(|point| missing(document, point)).sum();
-    if missing > 0 {
-        text += &format!("not complete: {missing} runs are missing; the same command goes on\n");
+    let missing = missing(document);
+    if !document.complete {
+        let what = if missing > 0 { format!("{missing} runs") } else { "pictures".to_owned() };
+        text += &format!("not complete: {what} are missing; the same command goes on\n");
     }
     let files: Vec<_> = written.iter().map(|path| readable(&path.display().to_string())).collect();
     text + &format!("written: {}\n", files.join(", "))
@@ -212,9 +227,11 @@ fn change(document: &Document, point: &Point) -> Option<Vec<String>> {
     Some([method, option(point).to_owned()].into_iter().chain(factors).collect())
 }
 
-fn missing(document: &Document, point: &Point) -> usize {
+/// How many runs are missing.
+pub fn missing(document: &Document) -> usize {
     let wanted = document.measurement.repeats as usize;
-    if point.failed.is_some() || point.is_other { 0 } else { wanted.saturating_sub(point.runs.len()) }
+    let ours = document.points.iter().filter(|point| point.failed.is_none() && !point.is_other);
+    ours.map(|point| wanted.saturating_sub(point.runs.len())).sum()
 }
 
 fn row(document: &Document, index: usize) -> Option<Vec<String>> {
@@ -318,5 +335,38 @@ mod tests {
         open.write(&Document { complete: true, ..more }, &pictures, true);
         assert!(!files[2].exists() && files[0].exists() && files[1].exists(), "only its own are removed");
         assert_eq!(of(&inside("cost.json")), "third");
+    }
+
+    /// One that was killed before it had a table and a page takes none of another.
+    #[test]
+    fn each_measurement_has_its_own_page() {
+        let pictures =
+            Images { reference: Picture { width: 1, height: 1, pixels: vec![[0.0; 3]] }, points: Vec::new() };
+        let named = |key: &str| {
+            let mut document = document(key);
+            document.scene.name = key.to_owned();
+            document
+        };
+        for (has_whole, pages) in
+            [(false, ["cost.html", "cost.partial.html"]), (true, ["cost.partial.html", "cost.partial-2.html"])]
+        {
+            let folder = tempfile::tempdir().unwrap();
+            let open = || Folder::open(folder.path(), &[]).unwrap();
+            if has_whole {
+                open().write(&Document { complete: true, ..named("whole") }, &pictures, true);
+            }
+            open().keep(&named("killed"));
+            let other = open();
+            other.keep(&named("stopped"));
+            other.write(&named("stopped"), &pictures, false);
+            let again = open();
+            let document = again.earlier("killed").unwrap();
+            again.write(&document, &pictures, false);
+            for (page, key) in pages.into_iter().zip(["killed", "stopped"]) {
+                assert!(std::fs::read_to_string(folder.path().join(page)).unwrap().contains(key), "{page}");
+            }
+            again.write(&Document { complete: true, ..document }, &pictures, true);
+            assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 6, "only its own are removed");
+        }
     }
 }

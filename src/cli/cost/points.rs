@@ -12,6 +12,7 @@ use crate::render::{Reproject, Reprojection, can_carry};
 use crate::scene::animation::Animation;
 use crate::scene::{Loaded, Scene, SceneFile};
 use crate::settings::entry::{self, Value};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What is measured.
@@ -51,6 +52,9 @@ impl Points {
         candidates.iter().try_for_each(Candidate::check_stride)?;
         let mut notes = Vec::new();
         candidates.extend(varied(args, &candidates, &mut notes)?);
+        // A variant may be a step of a knob, or given twice.
+        let mut known = BTreeSet::new();
+        candidates.retain(|candidate| known.insert(candidate.method.clone()));
         Ok((scene, Self { motion, base, candidates, notes }))
     }
 }

@@ -71,7 +71,7 @@ fn facts(document: &Document) -> Vec<(String, String)> {
     let Document { scene, machine, measurement, software, .. } = document;
     let commit = software.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
     let confidence = percent(measurement.confidence);
-    let intervals = match has_ranges(document) {
+    let intervals = match has_ranges(document, false) {
         false => format!("{confidence} % intervals"),
         true => format!("{confidence} % intervals of errors and factors, ranges of times"),
     };
@@ -96,18 +96,21 @@ fn facts(document: &Document) -> Vec<(String, String)> {
 /// What the bars of the plots are.
 fn bars(document: &Document) -> String {
     let confidence = percent(document.measurement.confidence);
-    match has_ranges(document) {
-        false => format!("Bars are {confidence} % intervals."),
-        true => format!(
-            "Bars of errors are {confidence} % intervals; those of times are the range of the runs, which are too few for such an interval."
-        ),
-    }
+    let of_times = match [false, true].map(|others| has_ranges(document, others)) {
+        [false, false] => return format!("Bars are {confidence} % intervals."),
+        [false, true] => "times of other renderers",
+        [true, _] => "times",
+    };
+    format!(
+        "Bars of errors are {confidence} % intervals; those of {of_times} are the range of the runs, which are too few for such an interval."
+    )
 }
 
-/// Whether a time has the range of its runs in place of an interval.
-fn has_ranges(document: &Document) -> bool {
+/// Whether a time of ours, or of others, has the range of its runs in place of an interval.
+fn has_ranges(document: &Document, others: bool) -> bool {
     let confidence = document.measurement.confidence;
-    let runs = document.points.iter().map(|point| point.runs.len()).filter(|&runs| runs > 0);
+    let points = document.points.iter().filter(|point| point.is_other == others && point.failed.is_none());
+    let runs = points.map(|point| point.runs.len()).filter(|&runs| runs > 0);
     runs.min().is_some_and(|fewest| !median_is_covered(fewest, confidence))
 }
 
