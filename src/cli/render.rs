@@ -71,7 +71,8 @@ pub struct Args {
     #[arg(long, value_name = "DURATION", value_parser = planned::duration, allow_hyphen_values = true,
           conflicts_with_all = ["error", "spp", "resume", "pixel"])]
     pub time: Option<Duration>,
-    /// Render in the least time an image of this relMSE, which is estimated without a reference
+    /// Render in the least time an image of this relMSE, which is estimated without a reference by a probe, which may take longer than
+    /// the render
     #[arg(long, value_name = "RELMSE", conflicts_with_all = ["spp", "resume", "pixel"])]
     pub error: Option<f64>,
     /// With --time or --error: where to write what was planned. Without: the plan to render, to the same bits

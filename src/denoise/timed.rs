@@ -84,6 +84,7 @@ fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
     let begun = Instant::now();
     once()?;
     let first_run = begun.elapsed();
+    wake(gpu)?;
     let (times, wall) = once()?;
     Ok(Timed { colour: colour(&parts.picture)?, times, wall, compile, first_run, device_bytes })
 }

@@ -1,6 +1,5 @@
 //! What a method will take and reach with more samples than a probe took: time is linear in samples, error a power of them.
 use super::probe::Level;
-use crate::render::settings::Settings;
 
 /// Powers of the number of samples by which error falls. Without a filter it is 1 for independent samples and up to about 1.6 for Sobol
 /// points; what a filter blurs for good falls more slowly.
@@ -26,20 +25,23 @@ pub struct Forecast {
     error: f64,
     /// The power up to there, and from there on.
     powers: [f64; 2],
+    /// Samples that a pixel can have.
+    most: f64,
 }
 
 impl Forecast {
-    /// From the levels of a probe, fewest samples first.
-    pub fn new(levels: &[Level], method: usize) -> Self {
+    /// From the levels of a probe, fewest samples first, of renders that have at most so many samples per pixel.
+    pub fn new(levels: &[Level], method: usize, most: u32) -> Self {
         let last = &levels[levels.len() - 1];
         let error = |level: &Level| level.methods[method].error.max(LEAST_ERROR);
-        let powers = match levels {
-            [.., before, last] => {
+        // The last level may have few samples more than the one before: the noise of both would be the power.
+        let powers = match levels.iter().rfind(|before| 2 * before.spp <= last.spp) {
+            Some(before) => {
                 let samples = f64::from(last.spp) / f64::from(before.spp);
                 let power = ((error(before) / error(last)).ln() / samples.ln()).clamp(POWERS[0], POWERS[1]);
                 [power, if before.spp == 1 { power.min(MOST_FROM_FOUR) } else { power }]
             }
-            _ => [USUAL_POWER; 2],
+            None => [USUAL_POWER; 2],
         };
         Self {
             start: last.start_ms,
@@ -48,6 +50,7 @@ impl Forecast {
             spp: f64::from(last.spp),
             error: error(last),
             powers,
+            most: most.into(),
         }
     }
 
@@ -71,14 +74,14 @@ impl Forecast {
     /// Samples that fit a time; none if not even one does.
     pub fn samples_within(&self, ms: f64) -> Option<u32> {
         let samples = ((ms - self.start - self.filter) / self.per_sample).floor();
-        (samples >= 1.0).then(|| samples.min(f64::from(Settings::MAX_SPP)) as u32)
+        (samples >= 1.0).then(|| samples.min(self.most) as u32)
     }
 
     /// Samples that reach an error; none if more were needed than a pixel can have.
     pub fn samples_for(&self, error: f64) -> Option<u32> {
         let gain = self.error / error;
         let samples = (self.spp * gain.powf(1.0 / self.powers[usize::from(gain > 1.0)])).ceil().max(1.0);
-        (samples <= f64::from(Settings::MAX_SPP)).then_some(samples as u32)
+        (samples <= self.most).then_some(samples as u32)
     }
 }
 
@@ -87,6 +90,8 @@ mod tests {
     use super::super::probe::Measured;
     use super::*;
 
+    const MOST: u32 = 1 << 24;
+
     fn level(spp: u32, error: f64) -> Level {
         let methods = vec![Measured { error, ms: 30.0 }];
         Level { spp, start_ms: 5.0, samples_ms: 10.0 * f64::from(spp), methods }
@@ -94,7 +99,7 @@ mod tests {
 
     #[test]
     fn time_is_a_line_and_error_a_power() {
-        let forecast = Forecast::new(&[level(1, 0.4), level(4, 0.1)], 0);
+        let forecast = Forecast::new(&[level(1, 0.4), level(4, 0.1)], 0, MOST);
         assert_eq!(forecast.time_of(10), 135.0);
         assert_eq!(forecast.samples_within(135.0), Some(10));
         assert_eq!((forecast.samples_within(134.9), forecast.samples_within(44.0)), (Some(9), None));
@@ -104,10 +109,24 @@ mod tests {
         assert_eq!((rehearsed.time_of(10), rehearsed.samples_within(135.0)), (155.0, Some(8)));
         assert_eq!((forecast.samples_for(0.0251), forecast.samples_for(9.0)), (Some(16), Some(1)));
         // As fast as Sobol points, and as slow as what is blurred: the powers have ends.
-        let fast = |few| Forecast::new(&[level(few, 1.0), level(4 * few, 1e-9)], 0).powers;
+        let fast = |few| Forecast::new(&[level(few, 1.0), level(4 * few, 1e-9)], 0, MOST).powers;
         assert_eq!((fast(1), fast(4)), ([POWERS[1], MOST_FROM_FOUR], [POWERS[1]; 2]));
-        let stuck = Forecast::new(&[level(1, 0.1), level(4, 0.1)], 0);
+        let stuck = Forecast::new(&[level(1, 0.1), level(4, 0.1)], 0, MOST);
         assert_eq!(stuck.samples_for(1e-6), None);
-        assert_eq!(Forecast::new(&[level(2, 0.1)], 0).samples_for(0.05), Some(4));
+        assert_eq!(Forecast::new(&[level(2, 0.1)], 0, MOST).samples_for(0.05), Some(4));
+    }
+
+    #[test]
+    fn a_power_is_that_of_twice_the_samples_or_more() {
+        let cut = Forecast::new(&[level(1, 0.4), level(4, 0.1), level(5, 0.079)], 0, 5);
+        assert_eq!(cut.powers, Forecast::new(&[level(1, 0.4), level(5, 0.079)], 0, 5).powers);
+        assert_eq!(Forecast::new(&[level(4, 0.1), level(5, 0.1)], 0, 5).powers, [USUAL_POWER; 2]);
+    }
+
+    #[test]
+    fn no_pixel_has_more_samples_than_it_can() {
+        let forecast = Forecast::new(&[level(1, 0.4), level(4, 0.1)], 0, 8);
+        assert_eq!([115.0, 1e6].map(|ms| forecast.samples_within(ms)), [Some(8); 2]);
+        assert_eq!([0.0501, 0.04].map(|error| forecast.samples_for(error)), [Some(8), None]);
     }
 }

@@ -76,22 +76,30 @@ pub struct Plan {
     pub probe_ms: f64,
 }
 
-/// Plans a render of `scene` with `settings`, whose samples per pixel are what is looked for. `methods` are the filters to choose
-/// among, [`filter::find`] of `none` standing for no filter.
+/// Plans a render of `scene` with `settings`, whose samples per pixel are what is looked for, and which keeps `outputs`: what a filter
+/// reads is added to them. `methods` are the filters to choose among, [`filter::find`] of `none` standing for no filter.
 ///
 /// # Errors
 /// [`Error::Usage`] for a target out of range or out of reach, for settings with a noise threshold or with a largest number of samples
 /// that their policy does not place by, and for an empty list of methods; [`Error::Device`], before anything is rendered for a film that
 /// is too large for one of the filters.
-pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], target: Target) -> Result<Plan> {
+pub fn plan(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &Settings,
+    outputs: Outputs,
+    methods: &[Method],
+    target: Target,
+) -> Result<Plan> {
     check(settings, methods, target)?;
     let size = [settings.width, settings.height];
-    if !methods.iter().all(|method| method.is_none()) {
+    let filters = !methods.iter().all(|method| method.is_none());
+    if filters {
         filter::check_size(gpu, size, filter::GUIDE_TEXELS)?;
     }
-    let mut probe = Probe::new(gpu, scene, settings, methods)?;
+    let mut probe = Probe::new(gpu, scene, settings, outputs.or(Outputs::for_filter(filters)), methods)?;
     let levels = probe.levels(target)?;
-    let mut forecasts = forecasts(&levels, methods);
+    let mut forecasts = forecasts(&levels, methods, most_samples(settings));
     if let Target::GpuMs(ms) = target
         && !settings.allocate.is_even()
     {
@@ -113,7 +121,7 @@ pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], t
     });
     let mut considered = by_cost(target, considered.collect());
     if considered.is_empty() {
-        return Err(out_of_reach(target, &forecasts));
+        return Err(out_of_reach(target, &forecasts, most_samples(settings)));
     }
     let chosen = considered.remove(0);
     Ok(Plan {
@@ -165,11 +173,20 @@ fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> 
     settings.validate()
 }
 
-fn forecasts(levels: &[Level], methods: &[Method]) -> Vec<Forecast> {
-    (0..methods.len()).map(|method| Forecast::new(levels, method)).collect()
+/// By method, of renders that have at most so many samples per pixel.
+fn forecasts(levels: &[Level], methods: &[Method], most: u32) -> Vec<Forecast> {
+    (0..methods.len()).map(|method| Forecast::new(levels, method, most)).collect()
 }
 
-fn out_of_reach(target: Target, forecasts: &[Forecast]) -> Error {
+/// Samples per pixel that a render has at most, on average.
+fn most_samples(settings: &Settings) -> u32 {
+    match settings.allocate.max_spp {
+        0 => Settings::MAX_SPP,
+        max => max,
+    }
+}
+
+fn out_of_reach(target: Target, forecasts: &[Forecast], most: u32) -> Error {
     let least = forecasts.iter().map(|forecast| forecast.time_of(1)).fold(f64::INFINITY, f64::min);
     Error::Usage(match target {
         Target::GpuMs(ms) => {
@@ -177,15 +194,15 @@ fn out_of_reach(target: Target, forecasts: &[Forecast]) -> Error {
                 "one sample a pixel takes {least:.3} ms here, {ms} ms were given: allow more, or choose a smaller film"
             )
         }
+        Target::RelMse(error) if most < Settings::MAX_SPP => {
+            format!(
+                "a relMSE of {error} takes more than {most} samples a pixel, which max_spp is: allow more of either"
+            )
+        }
         Target::RelMse(error) => {
-            format!("a relMSE of {error} takes more than {} samples a pixel: allow more error", Settings::MAX_SPP)
+            format!("a relMSE of {error} takes more than {most} samples a pixel: allow more error")
         }
     })
-}
-
-/// What a render without a filter needs, and one with.
-pub(crate) fn outputs(methods: &[Method]) -> Outputs {
-    Outputs::for_filter(!methods.iter().all(|method| method.is_none()))
 }
 
 impl Plan {

@@ -1,13 +1,14 @@
 //! Renders few samples, twice with different random numbers, and measures time and error.
 use super::halves::{self, Pixels};
-use super::{Target, outputs};
+use super::{Target, forecasts, most_samples};
 use crate::denoise::filter::Method;
 use crate::denoise::{Chain, Colour, Noisy, Recipe, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime, total_ms};
 use crate::image::Picture;
+use crate::machine::wake;
 use crate::render::settings::Settings;
-use crate::render::{Renderer, Step};
+use crate::render::{Outputs, Renderer, Step};
 use crate::scene::Scene;
 
 /// Each level has so many times the samples of the one before.
@@ -51,6 +52,7 @@ pub struct Probe<'a> {
     /// Its samples per pixel are those of a level where samples are placed, else more than any level has.
     renderer: Renderer,
     frame: FrameResources,
+    outputs: Outputs,
     methods: &'a [Method],
     /// By method, from the first image on.
     chains: Vec<Option<Chain<'a>>>,
@@ -69,16 +71,22 @@ struct Image {
 }
 
 impl<'a> Probe<'a> {
-    /// Makes the renderer and runs it once, so that its kernels are compiled.
+    /// Makes the renderer, which keeps `outputs`, and runs it once, so that its kernels are compiled.
     ///
     /// # Errors
     /// Those of [`Renderer::new`], and [`Error::Device`] for a device that tells no times.
-    pub fn new(gpu: &'a Gpu, scene: &'a Scene, settings: &Settings, methods: &'a [Method]) -> Result<Self> {
+    pub fn new(
+        gpu: &'a Gpu,
+        scene: &'a Scene,
+        settings: &Settings,
+        outputs: Outputs,
+        methods: &'a [Method],
+    ) -> Result<Self> {
         gpu.check_clock()?;
         // Batches are as large as those of a render of many samples.
         let spp = if settings.allocate.is_even() { Settings::MAX_SPP.min(4096) } else { 1 };
         let settings = Settings { spp, ..settings.clone() };
-        let renderer = Renderer::new(gpu, scene, &settings, outputs(methods))?;
+        let renderer = Renderer::new(gpu, scene, &settings, outputs)?;
         // Their random numbers are not those of the render, which would look as good as it is at the probe's expense.
         let seeds = [1, 2].map(|k| settings.seed.wrapping_add(k));
         let frame = FrameResources::new(gpu)?;
@@ -87,6 +95,7 @@ impl<'a> Probe<'a> {
             scene,
             renderer,
             frame,
+            outputs,
             methods,
             chains: methods.iter().map(|_| None).collect(),
             seeds,
@@ -105,19 +114,25 @@ impl<'a> Probe<'a> {
         let (mut pairs, mut spp) = (Vec::<(u32, [Image; 2])>::new(), 1);
         loop {
             let [first, second] = self.seeds;
+            wake(self.gpu)?;
             pairs.push((spp, [self.image(first, spp)?, self.image(second, spp)?]));
             let levels = self.judged(&pairs);
-            match next_spp(spp).filter(|_| pairs.len() < LEAST_LEVELS || self.wants_more(&levels, target)) {
+            match next_spp(spp, self.most()).filter(|_| pairs.len() < LEAST_LEVELS || self.wants_more(&levels, target))
+            {
                 Some(next) => spp = next,
                 None => return Ok(levels),
             }
         }
     }
 
+    fn most(&self) -> u32 {
+        most_samples(self.renderer.settings())
+    }
+
     fn wants_more(&self, levels: &[Level], target: Target) -> bool {
         let last = &levels[levels.len() - 1];
         let next_ms = 2.0 * f64::from(GROWTH) * last.samples_ms;
-        let forecasts = super::forecasts(levels, self.methods);
+        let forecasts = forecasts(levels, self.methods, self.most());
         match target {
             Target::GpuMs(ms) => next_ms <= SHARE * ms,
             Target::RelMse(error) => {
@@ -178,7 +193,8 @@ impl Probe<'_> {
     pub fn rehearse(&mut self, spp: u32) -> Result<f64> {
         self.chains.iter_mut().for_each(|chain| *chain = None);
         let settings = Settings { spp, ..self.renderer.settings().clone() };
-        self.renderer = Renderer::new(self.gpu, self.scene, &settings, outputs(self.methods))?;
+        self.renderer = Renderer::new(self.gpu, self.scene, &settings, self.outputs)?;
+        wake(self.gpu)?;
         let mut took = 0.0;
         for step in self.renderer.steps() {
             took += total_ms(&self.renderer.run(&mut self.frame, &step)?);
@@ -234,9 +250,9 @@ fn level(spp: u32, [a, b]: &[Image; 2], methods: Vec<Measured>) -> Level {
     Level { spp, start_ms, samples_ms, methods }
 }
 
-/// Samples per pixel of the level after one of so many; none where a render may not have them.
-fn next_spp(spp: u32) -> Option<u32> {
-    spp.checked_mul(GROWTH).filter(|next| *next <= Settings::MAX_SPP)
+/// Samples per pixel of the level after one of so many; none where a render has no more.
+fn next_spp(spp: u32, most: u32) -> Option<u32> {
+    Some(spp.saturating_mul(GROWTH).min(most)).filter(|&next| next > spp)
 }
 
 #[cfg(test)]
@@ -258,8 +274,8 @@ mod tests {
 
     #[test]
     fn levels_end_where_renders_do() {
-        let levels: Vec<_> = std::iter::successors(Some(1), |spp| next_spp(*spp)).take(20).collect();
-        assert_eq!((levels.len(), levels.last()), (13, Some(&Settings::MAX_SPP)));
-        assert_eq!(next_spp(u32::MAX), None);
+        let levels = |most| std::iter::successors(Some(1), move |spp| next_spp(*spp, most)).collect::<Vec<_>>();
+        assert_eq!((levels(Settings::MAX_SPP).len(), levels(Settings::MAX_SPP).last()), (13, Some(&Settings::MAX_SPP)));
+        assert_eq!([levels(1), levels(6), levels(16)], [vec![1], vec![1, 4, 6], vec![1, 4, 16]]);
     }
 }

@@ -35,6 +35,15 @@ impl Outputs {
     pub fn for_filter(follows: bool) -> Self {
         if follows { Self::FILTERED } else { Self::default() }
     }
+
+    /// What one of both leaves.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            split_light: self.split_light || other.split_light,
+            guides: self.guides || other.guides,
+            counters: self.counters || other.counters,
+        }
+    }
 }
 
 /// A scene on a device and the kernels to render it, all made in [`Renderer::new`]. Later, only [`Renderer::keep_history`] makes more, and

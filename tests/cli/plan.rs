@@ -81,6 +81,9 @@ fn a_time_decides_the_samples_and_a_given_filter_is_taken() {
     let placed = plan("--time 400ms --allocate both --denoise none");
     let [probe, planned] = [&placed["probe_ms"], &placed["chosen"]["gpu_ms"]].map(|ms| ms.as_f64().unwrap());
     assert!(probe > 0.4 * planned, "{placed}");
+    // No more than a pixel may have, however much time there is.
+    let few = plan("--time 20s --allocate both --max-spp 4 --denoise none");
+    assert_eq!(few["chosen"]["spp"], 4, "{few}");
 }
 
 #[test]
@@ -96,6 +99,7 @@ fn what_cannot_be_planned_is_told_in_one_line() {
     complains(&small("--time 1s --noise-threshold 0.1"), 2, &["a noise threshold ends a render by itself"]);
     complains(&small("--time 1s --max-spp 9"), 2, &["leave out max_spp", "another policy"]);
     complains(&small("--error 0.5 --max-spp 9000"), 2, &["leave out max_spp"]);
+    complains(&small("--error 0.001 --allocate both --max-spp 4"), 2, &["more than 4 samples", "max_spp"]);
     complains(&small("--time 1s --spp 4"), 2, &["--spp"]);
     complains(&small("--plan none.json"), 3, &["none.json"]);
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();

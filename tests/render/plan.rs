@@ -43,7 +43,8 @@ fn planned_errors_are_true_ones() {
         for (policy, name) in methods {
             let method = Method::Kernels(filter::find(name).unwrap());
             let first = scene(file, policy, 1, 3);
-            let found = plan(&gpu, &first, &first.settings, &[method], Target::RelMse(error)).unwrap();
+            let found =
+                plan(&gpu, &first, &first.settings, Outputs::default(), &[method], Target::RelMse(error)).unwrap();
             assert!(found.chosen.relmse <= error * 1.001, "{file}, {policy}, {name}: {found:?}");
             let of = Some(method).filter(|_| name != "none");
             // Few pixels decide the error of one image, where lamps are seen: four images tell it better.

@@ -17,6 +17,7 @@ use tallow::scene::{Loaded, Scene};
 #[derive(Parser)]
 struct Args {
     /// Scenes, at their own settings but for the size
+    #[arg(required = true)]
     scenes: Vec<PathBuf>,
     /// Film size
     #[arg(long, default_value_t = 256)]
@@ -111,7 +112,7 @@ fn measure(gpu: &Gpu, scene: &Loaded, runs: u32, target: Target, reference: Opti
     let (mut plans, mut ratios) = (Vec::new(), Vec::new());
     for run in 0..runs {
         let settings = Settings { seed: 10 * run, ..scene.settings.clone() };
-        let planned = plan(gpu, scene, &settings, &usual_methods(), target)?;
+        let planned = plan(gpu, scene, &settings, Outputs::default(), &usual_methods(), target)?;
         let (ms, picture) = rendered(gpu, scene, &planned)?;
         ratios.push(match (target, reference) {
             (Target::RelMse(error), Some(reference)) => metrics::relmse(&picture, reference) / error,

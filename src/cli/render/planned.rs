@@ -74,7 +74,7 @@ pub fn make(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings) -> Resul
     let Some(target) = target(args) else { return Ok(None) };
     check_room(args.filter(settings), settings, gpu)?;
     let methods = args.denoise.map_or_else(|| fitting(args, gpu, settings), |method| vec![method]);
-    plan::plan(gpu, scene, settings, &methods, target).map(Some)
+    plan::plan(gpu, scene, settings, args.wanted(), &methods, target).map(Some)
 }
 
 /// What a plan may choose among that names no filter, less what this film has no room for, which is said.
