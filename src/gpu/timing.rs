@@ -57,12 +57,18 @@ pub struct Calibration {
     /// Nanoseconds by which the two moments may lie apart: the deviation that the driver tells, and half the time that
     /// asking it took.
     pub deviation_ns: u64,
+    /// Nanoseconds after which the device's clock begins anew.
+    pub wraps_after_ns: u128,
 }
 
 impl Calibration {
-    /// The host's clock minus the device's.
-    pub fn host_minus_device_ns(&self) -> i64 {
-        self.host_ns.wrapping_sub(self.device_ns) as i64
+    /// The host's clock, negative before [`host_ns`] is first called, at a moment of the device's, which may have begun anew once between
+    /// the two: of the time after which it does, up to seven eighths before this moment and one behind it.
+    pub fn host_ns_of(&self, device_ns: u64) -> i64 {
+        let wraps_after = (self.wraps_after_ns as i128).max(1);
+        let late = wraps_after / 8;
+        let ago = (i128::from(self.device_ns) - i128::from(device_ns) + late).rem_euclid(wraps_after) - late;
+        (i128::from(self.host_ns) - ago) as i64
     }
 }
 
@@ -80,7 +86,13 @@ impl Gpu {
             Some((deviation.saturating_add(half), ticks, before + half))
         });
         let (deviation_ns, ticks, host_ns) = tries.min()?;
-        Some(Calibration { device_ns: Clock::of(self).absolute(ticks), host_ns, deviation_ns })
+        let clock = Clock::of(self);
+        Some(Calibration {
+            device_ns: clock.absolute(ticks),
+            host_ns,
+            deviation_ns,
+            wraps_after_ns: clock.wraps_after(),
+        })
     }
 }
 
@@ -102,6 +114,11 @@ impl Clock {
         scale(end.wrapping_sub(begin) & mask, self.period)
     }
 
+    /// Nanoseconds of all values that the counter has.
+    fn wraps_after(self) -> u128 {
+        nanoseconds(1 << self.bits, self.period)
+    }
+
     /// Nanoseconds since the counter was 0.
     pub fn absolute(self, ticks: u64) -> u64 {
         self.between(0, ticks)
@@ -117,8 +134,13 @@ impl Clock {
 /// Converts ticks to nanoseconds, with the period in 40-bit fixed point because a double cannot hold 64-bit ticks. The
 /// result is exact for a period of 1 and within a relative 2^-24 otherwise. It is limited to 64 bits.
 fn scale(ticks: u64, period: f32) -> u64 {
+    nanoseconds(ticks.into(), period).try_into().unwrap_or(u64::MAX)
+}
+
+/// The same without a limit.
+fn nanoseconds(ticks: u128, period: f32) -> u128 {
     let fixed = (f64::from(period) * (1u64 << 40) as f64) as u128;
-    ((u128::from(ticks) * fixed) >> 40).try_into().unwrap_or(u64::MAX)
+    (ticks * fixed) >> 40
 }
 
 /// The timestamp queries of one frame.

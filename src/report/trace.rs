@@ -12,17 +12,20 @@ const GPU: u32 = 2;
 /// Spans of a thread do not overlap, and are written in the order in which they begin.
 pub fn chrome_trace(cpu: &[PassTime], gpu: &[PassTime], calibration: Option<Calibration>) -> String {
     // A device may count from any moment, so differences need a sign in addition to 64 bits.
-    let first = |spans: &[PassTime]| spans.iter().map(|s| i128::from(s.begin_ns)).min();
-    let aligned = || first(cpu).unwrap_or(0) - first(gpu).unwrap_or(0);
-    let offset = calibration.map_or_else(aligned, |moment| i128::from(moment.host_minus_device_ns()));
-    let origin = first(cpu).into_iter().chain(first(gpu).map(|ns| ns + offset)).min().unwrap_or(0);
+    let first = |spans: &[PassTime]| spans.iter().map(|s| i128::from(s.begin_ns)).min().unwrap_or(0);
+    let aligned = first(cpu) - first(gpu);
+    let begins = |span: &PassTime| i128::from(span.begin_ns);
+    let on_host =
+        |span: &PassTime| calibration.map_or(begins(span) + aligned, |moment| moment.host_ns_of(span.begin_ns).into());
+    let origin = cpu.iter().map(begins).chain(gpu.iter().map(on_host)).min().unwrap_or(0);
     let gpu_name = if calibration.is_some() { "GPU" } else { "GPU (offset to the CPU unknown)" };
     let mut events = vec![name_event("process_name", CPU, "tallow")];
     events.extend([name_event("thread_name", CPU, "CPU"), name_event("thread_name", GPU, gpu_name)]);
-    for (spans, thread, shift) in [(cpu, CPU, -origin), (gpu, GPU, offset - origin)] {
-        let mut spans = spans.to_vec();
-        spans.sort_by_key(|span| span.begin_ns);
-        events.extend(spans.iter().map(|span| span_event(span, thread, shift)));
+    let begins: [&dyn Fn(&PassTime) -> i128; 2] = [&begins, &on_host];
+    for ((spans, thread), begins) in [(cpu, CPU), (gpu, GPU)].into_iter().zip(begins) {
+        let mut spans: Vec<_> = spans.iter().map(|span| (begins(span) - origin, span)).collect();
+        spans.sort_by_key(|(begins, _)| *begins);
+        events.extend(spans.iter().map(|(begins, span)| span_event(span, thread, *begins)));
     }
     let deviation = calibration.map(|moment| microseconds(moment.deviation_ns.into()));
     let other = json!({ "clockDeviationMicroseconds": deviation });
@@ -33,8 +36,8 @@ fn name_event(kind: &str, thread: u32, name: &str) -> Value {
     json!({ "ph": "M", "name": kind, "pid": 1, "tid": thread, "args": { "name": name } })
 }
 
-fn span_event(span: &PassTime, thread: u32, shift_ns: i128) -> Value {
-    let begin_us = microseconds(i128::from(span.begin_ns) + shift_ns);
+fn span_event(span: &PassTime, thread: u32, begin_ns: i128) -> Value {
+    let begin_us = microseconds(begin_ns);
     let duration_us = microseconds(span.duration_ns().into());
     json!({ "ph": "X", "name": span.name, "pid": 1, "tid": thread, "ts": begin_us, "dur": duration_us })
 }
@@ -66,11 +69,19 @@ mod tests {
     fn both_clocks_share_one_axis_in_microseconds() {
         let (cpu, gpu) = ([span("load", 5_000, 9_000)], [span("path", 1_000, 3_500)]);
         // GPU 1000 is host 1000 + 7000: 3 microseconds after the first host event.
-        let moment = Calibration { device_ns: 10, host_ns: 7_010, deviation_ns: 1_500 };
+        let moment = Calibration { device_ns: 10, host_ns: 7_010, deviation_ns: 1_500, wraps_after_ns: 1 << 64 };
         let trace = chrome_trace(&cpu, &gpu, Some(moment));
         assert_eq!(find(&trace, "load"), (u64::from(CPU), 0.0, 4.0));
         assert_eq!(find(&trace, "path"), (u64::from(GPU), 3.0, 2.5));
         assert!(!trace.contains("unknown") && trace.contains("\"clockDeviationMicroseconds\":1.5"));
+    }
+
+    #[test]
+    fn passes_before_the_clock_began_anew_stay_before_those_behind_it() {
+        let gpu = [span("last", 990, 1_010), span("next", 30, 40)];
+        let moment = Calibration { device_ns: 60, host_ns: 5_060, deviation_ns: 0, wraps_after_ns: 1_000 };
+        let trace = chrome_trace(&[], &gpu, Some(moment));
+        assert_eq!(["last", "next"].map(|name| find(&trace, name).1), [0.0, 0.04]);
     }
 
     #[test]
