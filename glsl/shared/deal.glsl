@@ -118,8 +118,11 @@ bool deal_triangles(inout Hit hit, Leaves leaves, uvec2 from, out uint spheres) 
         uint k = first + lane, owner = lane_of(ends, k);
         bool dealt = k < total;
         uint rank = from_lane(ends, owner) - 1u - k;
-        uint bit = dealt ? select_bit(from_lane(leaves.bits, owner), rank) : 0u;
-        uint index = dealt ? from_lane(leaves.first, owner) + bit : 0u;
+        // Lanes are read where all are at one place of the code: what others read of a lane that is not there is undefined.
+        uint its_bits = from_lane(leaves.bits, owner), its_first = from_lane(leaves.first, owner);
+        uvec2 its_from = uvec2(from_lane(from.x, owner), FX_INSTANCES ? from_lane(from.y, owner) : NONE);
+        uint bit = dealt ? select_bit(its_bits, rank) : 0u;
+        uint index = dealt ? its_first + bit : 0u;
         bool sphere = FX_SPHERES && dealt && is_sphere(index);
         RaySpace ray;
         ray.origin = from_lane(leaves.ray.origin, owner);
@@ -131,7 +134,7 @@ bool deal_triangles(inout Hit hit, Leaves leaves, uvec2 from, out uint spheres) 
         float t;
         vec2 barycentric;
         bool meets = intersect_triangle(ray, index, from_lane(hit.t, owner), t, barycentric) && dealt && !sphere &&
-                     (index != from_lane(from.x, owner) || (FX_INSTANCES && instance != from_lane(from.y, owner)));
+                     (index != its_from.x || (FX_INSTANCES && instance != its_from.y));
         uint distance = meets ? floatBitsToUint(t) : 0xffffffffu, winner = lane;
         take_nearer(1u, owner, distance, winner);
         take_nearer(2u, owner, distance, winner);

@@ -60,9 +60,9 @@ uint alias_choose(AliasEntry entry, uint n, inout uint random) {
 }
 
 // Coordinates of a direction in the environment's own frame (row 0 is +y): u = atan(x, -z) / 2 pi, v = acos(y) / pi, the latter
-// by atan, since acos is inexact near the poles. `sine` = length(d.xz).
+// by atan, since acos is inexact near the poles. `sine` = length(d.xz). At a pole atan(0, 0) may be no number.
 vec2 environment_uv(vec3 d, float sine) {
-    return vec2(atan(d.x, -d.z) * (0.5 / PI), atan(sine, d.y) / PI);
+    return vec2(sine > 0.0 ? atan(d.x, -d.z) * (0.5 / PI) : 0.0, atan(sine, d.y) / PI);
 }
 
 mat3 environment_rotation(uint light) { // environment_from_world
@@ -75,7 +75,7 @@ vec4 environment_lookup(vec2 uv) {
     vec2 at = uv * vec2(size) - 0.5;
     ivec2 p = ivec2(floor(at));
     vec2 f = at - vec2(p);
-    // At the poles atan(0, 0) may be no number, from which any integer may come.
+    // From a direction that is no number any integer may come.
     int x0 = clamp(p.x < 0 ? p.x + size.x : p.x >= size.x ? p.x - size.x : p.x, 0, size.x - 1);
     int x1 = x0 + 1 == size.x ? 0 : x0 + 1;
     int y0 = clamp(p.y, 0, size.y - 1) * size.x, y1 = clamp(p.y + 1, 0, size.y - 1) * size.x;
@@ -118,11 +118,10 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
         vec2 at = vec2(texel % size.x, texel / size.x) + 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
         vec2 uv = at / vec2(size);
         uv.y = 1.0 - abs(1.0 - abs(uv.y));
-        float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
-        float sine = sin(theta);
-        s.direction = transpose(environment_rotation(light)) * vec3(sin(phi) * sine, cos(theta), -cos(phi) * sine);
+        vec2 azimuth = circle_point(uv.x - floor(uv.x)), polar = sine_cosine(PI * uv.y);
+        s.direction = transpose(environment_rotation(light)) * vec3(azimuth.y * polar.x, polar.y, -azimuth.x * polar.x);
         vec4 found = environment_lookup(uv);
-        s.pdf = environment_pdf(light, found.w, sine);
+        s.pdf = environment_pdf(light, found.w, polar.x);
         s.radiance *= found.rgb;
     }
     s.radiance = s.pdf > 0.0 ? s.radiance / s.pdf : vec3(0.0);
@@ -157,8 +156,8 @@ vec3 sample_spherical_triangle(SphericalTriangle t, vec2 u) {
     float half_angle = 0.5 * u.x * t.solid_angle;
     vec3 along = normalize(t.c - dot(t.a, t.c) * t.a);
     float volume = abs(dot(cross(t.a, t.b), along));
-    float s = sin(half_angle), ab = dot(t.a, t.b);
-    float half_tan = (1.0 + ab) * s / max(volume * cos(half_angle) - dot(t.b, along) * s, 1e-10);
+    vec2 turn = sine_cosine(half_angle);
+    float half_tan = (1.0 + dot(t.a, t.b)) * turn.x / max(volume * turn.y - dot(t.b, along) * turn.x, 1e-10);
     vec3 d = ((1.0 - half_tan * half_tan) * t.a + 2.0 * half_tan * along) / (1.0 + half_tan * half_tan);
     vec3 chord = d - t.b;
     float rest = 0.5 * u.y * dot(chord, chord); // 1 - cosine of the part of the arc

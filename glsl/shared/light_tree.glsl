@@ -6,6 +6,8 @@ const uint CHILDREN = 4u; // of a node
 
 const float UNIT_STEP = 5.9604644775390625e-8; // between the numbers that unit_interval returns
 
+const float WORD = 2.3283064365386963e-10; // probability of one of all words
+
 // What bounds may lose by rounding, so that nothing that brings light is passed over: cosines of differences of angles come out of square
 // roots.
 const float COSINE_SLACK = 5e-4;
@@ -93,24 +95,29 @@ uint choose_by_tree(Receiver r, float u, uint bits, inout float probability) {
 }
 
 // The light that `word` chooses: one outside of the tree by its probability, or one of the tree, for which `probability` becomes that of the
-// choice. It is 0 if no light can bring anything. Replaces `word` by its position within what chooses a light outside.
+// choice. It is 0 if no light can bring anything. Replaces `word` by its position within what chooses a light outside. Those have the last
+// of all words, in whole numbers of them: by 24 bits, one of a small probability would be chosen too often, too seldom or never.
 uint choose_light(Receiver r, inout uint word, out float probability) {
-    float u = unit_interval(word);
-    uint hash = pcg(word), end = LightNode_child(light_nodes, 0u), light = 0u;
-    float before = LightNode_power(light_nodes, 0u);
-    probability = before;
-    float digits = UNIT_STEP * unit_interval(hash); // below those of `u`, in place of those that the choice uses up
-    if (u < before) return choose_by_tree(r, min((u + digits) / before, BELOW_ONE), pcg(hash), probability);
+    uint hash = pcg(word), end = LightNode_child(light_nodes, 0u), light = 0u, rest = word;
+    uint place = ~word, begin = 0u;
+    float by_tree = LightNode_power(light_nodes, 0u);
     probability = 0.0;
     for (uint i = 1u; i < end; i++) {
         LightNode outside = LightNode_load(light_nodes, i);
-        if (outside.power > 0.0 && u >= before) {
+        uint words = min(uint(min(outside.power, BELOW_ONE) * 4294967296.0), ~begin);
+        if (words > 0u && place >= begin) { // in the end the last, if rounding leaves something and there is no tree
             light = outside.child & ~LIGHT_LEAF;
-            probability = outside.power;
-            word = word_of_unit((u - before + digits) / outside.power, hash);
+            probability = float(words) * WORD;
+            rest = word_of_unit((float(place - begin) + unit_interval(hash)) / float(words), hash);
         }
-        before += outside.power;
+        begin += words;
     }
+    if (by_tree > 0.0 && place >= begin) {
+        float digits = UNIT_STEP * unit_interval(hash); // below those of the word, in place of those that the choice uses up
+        probability = begin > 0u ? float(0u - begin) * WORD : by_tree;
+        return choose_by_tree(r, min((unit_interval(word) + digits) / probability, BELOW_ONE), pcg(hash), probability);
+    }
+    word = rest;
     return light;
 }
 

@@ -23,9 +23,9 @@ vec3 sphere_side(Sphere s) {
     return (s.flags & SPHERE_MIRRORED) != 0u ? -side : side;
 }
 
-// u is the azimuth, v rises from pole to pole, as on the tessellated shape.
+// u is the azimuth, v rises from pole to pole, as on the tessellated shape. At a pole atan(0, 0) may be no number.
 vec2 sphere_coordinates(Sphere s, vec3 normal) {
     float x = dot(normal, s.meridian), y = dot(normal, sphere_side(s));
-    float u = atan(y, x) * (0.5 / PI);
+    float u = x != 0.0 || y != 0.0 ? atan(y, x) * (0.5 / PI) : 0.0;
     return vec2(u < 0.0 ? u + 1.0 : u, 1.0 - atan(length(vec2(x, y)), dot(normal, s.pole)) / PI);
 }

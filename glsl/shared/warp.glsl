@@ -14,6 +14,15 @@ vec2 circle_point(float u) {
     return vec2(s, x < 0.0 ? c : -c);
 }
 
+// Sine and cosine of an angle from 0 to pi (errors below 1e-6), up to pi/2 the sine to a share of itself: a driver's own may be off by 5e-4
+// (Vulkan, "Precision and Operation of SPIR-V Instructions"), which is more than a small angle.
+vec2 sine_cosine(float angle) {
+    float h = 0.5 * angle, q = h * h;
+    float s = h + h * q * (-0.16666667 + q * (0.0083333333 + q * (-1.9841270e-4 + q * (2.7557319e-6 + q * -2.5052108e-8))));
+    float c = 1.0 + q * (-0.5 + q * (0.041666667 + q * (-0.0013888889 + q * (2.4801587e-5 + q * (-2.7557319e-7 + q * 2.0876757e-9)))));
+    return vec2(2.0 * s * c, 1.0 - 2.0 * s * s);
+}
+
 // A point uniformly distributed on the unit disk.
 vec2 warp_disk(vec2 u) {
     return sqrt(u.x) * circle_point(u.y);

@@ -122,8 +122,8 @@ fn begin_anew(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     Ok(())
 }
 
-/// Begins a frame with the samples of the last that still hold; without any where something has changed and either was seen otherwise than
-/// from a point.
+/// Begins a frame with the samples of the last that still hold; without any where something has changed that is not followed, or either
+/// was seen otherwise than from a point.
 fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     let Frame { scene, film, constants, kernels, .. } = frame;
     let (history, tile) = (frame.history()?, &film.tiles[0]);
@@ -134,9 +134,8 @@ fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
     rec.update(&scene.camera, &constants.camera)?; // camera
     rec.fill(&film.broken, 0)?; // 0 -> broken
-    match &history.probes {
-        _ if !history.has_changed() => reproject::remember(rec, history, scene, tile, &constants.path)?, // guide[P], stats[P] -> history[P]
-        None => {} // nothing is carried
+    match history.probes.as_ref().filter(|_| history.has_changed()) {
+        None => reproject::remember(rec, history, scene, tile, &constants.path)?, // guide[P], stats[P] -> history[P]
         Some(probes) => {
             light_change::trace(rec, (history, probes), scene, tile, &constants.path, true)?; // probes[cells], history[P] -> changes[cells]
             light_change::sum(rec, probes)?; // changes[cells] -> changes[cells]

@@ -2,7 +2,9 @@
 use crate::layout::*;
 use crate::math::hash::{pcg, word_of_unit};
 use crate::math::srgb::luminance;
-use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_tent, warp_triangle};
+use crate::math::warp::{
+    basis_from_normal, circle_point, sine_cosine, warp_cone, warp_sphere, warp_tent, warp_triangle,
+};
 use crate::scene::{Environment, Scene};
 use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
 use crate::twins::light_tree::{Choice, choose_light, nominal_pdf, spot_share};
@@ -44,7 +46,7 @@ pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
 }
 
 fn environment_uv(d: Vec3, sine: f32) -> Vec2 {
-    vec2(d.x.atan2(-d.z) * (0.5 / PI), sine.atan2(d.y) / PI)
+    vec2(if sine > 0.0 { d.x.atan2(-d.z) * (0.5 / PI) } else { 0.0 }, sine.atan2(d.y) / PI)
 }
 
 /// Rotation from environment to world space.
@@ -91,9 +93,8 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
             let at = centre + vec2(warp_tent(u.x), warp_tent(u.y));
             let mut uv = at / vec2(e.width as f32, e.height as f32);
             uv.y = 1.0 - (1.0 - uv.y.abs()).abs();
-            let (phi, theta) = (2.0 * PI * uv.x, PI * uv.y);
-            let sine = theta.sin();
-            let d = vec3(phi.sin() * sine, theta.cos(), -phi.cos() * sine);
+            let (azimuth, [sine, cosine]) = (circle_point(uv.x - uv.x.floor()), sine_cosine(PI * uv.y));
+            let d = vec3(azimuth.y * sine, cosine, -azimuth.x * sine);
             let found = environment_lookup(e, uv);
             let radiance = Vec3::from(light.value) * found.xyz();
             (environment_rotation(light) * d, radiance, environment_pdf(e, light, found.w, sine))
@@ -126,7 +127,7 @@ impl SphericalTriangle {
     /// A direction, uniform by solid angle (Arvo 1995).
     fn sample(&self, u: Vec2) -> Vec3 {
         let [a, b, c] = self.corners;
-        let (sin, cos) = (0.5 * u.x * self.solid_angle).sin_cos();
+        let [sin, cos] = sine_cosine(0.5 * u.x * self.solid_angle);
         let along = (c - a.dot(c) * a).normalize();
         let volume = a.cross(b).dot(along).abs();
         let half_tan = (1.0 + a.dot(b)) * sin / (volume * cos - b.dot(along) * sin).max(1e-10);

@@ -4,7 +4,7 @@ use crate::math::hash::{pcg, unit_interval, word_of_unit};
 use crate::math::octahedral::{octahedral_decode, snorms};
 use crate::scene::Scene;
 use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS};
-use crate::shaders::shared::light_tree::{CHILDREN, COSINE_SLACK, LARGEST_SEEN, LEAST_COSINES, UNIT_STEP};
+use crate::shaders::shared::light_tree::{CHILDREN, COSINE_SLACK, LARGEST_SEEN, LEAST_COSINES, UNIT_STEP, WORD};
 use crate::shaders::shared::pcg::BELOW_ONE;
 use glam::Vec3;
 
@@ -139,19 +139,22 @@ pub struct Choice {
 
 /// The light that `word` chooses, in a scene with a tree.
 pub fn choose_light(scene: &Scene, r: &Receiver, word: u32) -> Choice {
-    let (u, hash, root) = (unit_interval(word), pcg(word), &scene.light_nodes[0]);
-    let (mut before, digits) = (root.power, UNIT_STEP * unit_interval(hash));
-    if u < before {
-        let (light, probability) = choose_by_tree(scene, r, ((u + digits) / before).min(BELOW_ONE), pcg(hash));
-        return Choice { light, rest: word, probability: before * probability };
-    }
-    let mut chosen = Choice { light: 0, rest: word, probability: 0.0 };
+    let (hash, root, place) = (pcg(word), &scene.light_nodes[0], !word);
+    let (mut begin, mut chosen) = (0, Choice { light: 0, rest: word, probability: 0.0 });
     for outside in &scene.light_nodes[1..root.child as usize] {
-        if outside.power > 0.0 && u >= before {
-            let rest = word_of_unit((u - before + digits) / outside.power, hash);
-            chosen = Choice { light: outside.child & !LIGHT_LEAF, rest, probability: outside.power };
+        let words = ((outside.power.min(BELOW_ONE) * 4294967296.0) as u32).min(!begin);
+        if words > 0 && place >= begin {
+            let rest = word_of_unit(((place - begin) as f32 + unit_interval(hash)) / words as f32, hash);
+            let probability = words as f32 * WORD;
+            chosen = Choice { light: outside.child & !LIGHT_LEAF, rest, probability };
         }
-        before += outside.power;
+        begin += words;
+    }
+    if root.power > 0.0 && place >= begin {
+        let u = unit_interval(word) + UNIT_STEP * unit_interval(hash);
+        let by_tree = if begin > 0 { begin.wrapping_neg() as f32 * WORD } else { root.power };
+        let (light, probability) = choose_by_tree(scene, r, (u / by_tree).min(BELOW_ONE), pcg(hash));
+        return Choice { light, rest: word, probability: by_tree * probability };
     }
     chosen
 }

@@ -39,7 +39,7 @@ impl Sphere {
     /// Texture coordinates of the point in the direction `normal`.
     pub fn coordinates(&self, normal: Vec3) -> Vec2 {
         let (x, y) = (normal.dot(self.meridian), normal.dot(self.side()));
-        let u = y.atan2(x) * (0.5 / PI);
+        let u = if x != 0.0 || y != 0.0 { y.atan2(x) * (0.5 / PI) } else { 0.0 };
         let v = 1.0 - vec2(x, y).length().atan2(normal.dot(self.pole)) / PI;
         vec2(if u < 0.0 { u + 1.0 } else { u }, v)
     }

@@ -1,3 +1,4 @@
-//! Tests of the repository itself: which modules import which, and the scripts below `tools`.
+//! Tests of the repository itself: which modules import which, what kernels may not ask for, and the scripts below `tools`.
 mod imports;
+mod kernels;
 mod tools;

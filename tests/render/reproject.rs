@@ -9,7 +9,7 @@ use tallow::gpu::Gpu;
 use tallow::layout::{Camera, NONE, PixelLight, PixelStats};
 use tallow::render::settings::Settings;
 use tallow::render::{Carriage, Carried, Moves, Outputs, Renderer, Reproject, Reprojection, Step, carried_samples};
-use tallow::scene::{Loaded, Scene};
+use tallow::scene::{Change, Loaded, Scene};
 
 fn scene(file: &str, change: impl Fn(&mut Settings)) -> Loaded {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file))
@@ -310,6 +310,28 @@ fn limits_hold() {
         .to_string();
     assert!(error.contains("reproject-age is 256"), "{error}");
     assert!(film.run(&mut tallow::gpu::FrameResources::new(&gpu).unwrap(), &Step::Reproject).is_err());
+    assert_silent(&gpu);
+}
+
+/// A history that follows the camera alone has records of no surface where something else has changed: nothing looks for any.
+#[test]
+fn a_change_that_is_not_followed_begins_anew() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/scene.toml", small);
+    for way in WAYS {
+        let mut film = Film::new(&gpu, &scene, by(way));
+        let camera = film.camera;
+        film.frame(camera);
+        film.begin(turned(camera, 1.0));
+        assert!(film.carried().iter().any(|&word| carried_samples(word) > 0), "control");
+        film.frame(camera);
+        let change = Change { lights: true, ..Change::default() };
+        film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+        let passes = film.begin(turned(camera, 1.0));
+        let names: Vec<_> = passes.iter().map(|pass| pass.name).collect();
+        assert!(!names.contains(&"gather") && !names.contains(&"carry"), "{names:?}");
+        assert!(film.carried().iter().all(|&word| carried_samples(word) == 0));
+    }
     assert_silent(&gpu);
 }
 

@@ -4,7 +4,7 @@ use crate::statistics::{chi_square, sidak};
 use crate::twin::{Random, Workplace, many_lamps};
 use glam::{Mat3, Vec3, dvec3, vec3};
 use std::f64::consts::{PI, TAU};
-use tallow::layout::{LIGHT_ENVIRONMENT, LIGHT_LEAF, Light, MATERIAL_EMITS_BEHIND, NONE};
+use tallow::layout::{LIGHT_ENVIRONMENT, LIGHT_LEAF, LIGHT_POINT, Light, MATERIAL_EMITS_BEHIND, NONE};
 use tallow::math::hash::{pcg, unit_interval};
 use tallow::scene::Loaded;
 use tallow::shaders::shared::light::EVEN_SHARE;
@@ -414,6 +414,36 @@ fn a_sky_beside_a_tree_gets_a_word_of_even_digits() {
             assert!(p > sidak(16), "{share}, from bit {shift}: {p:.1e}");
             let stuck = uneven(&|rest| (rest >> shift & 15 | 1) as usize);
             assert!(stuck < sidak(16), "control: a digit that is always 1, from bit {shift}");
+        }
+    }
+}
+
+/// Bulbs beside a tree of lamps that shine many million times as bright, counted over the words that choose them: all of the last ones.
+#[test]
+fn faint_lights_beside_a_tree_are_chosen_as_often_as_told() {
+    let lamps: Vec<_> = (0..8).map(|i| corners(i, Vec3::ONE)).collect();
+    let place = Workplace::new().obj("lamps.obj", &lamps);
+    for emission in [1e8, 1e10] {
+        let scene = place.scene(&format!(
+            "[[material]]\nname = 'a'\nemission = {emission}\n[[mesh]]\nfile = 'lamps.obj'\nmaterial = 'a'\n\
+             [[light]]\ntype = 'point'\nposition = [0, 1, 0]\nintensity = 0.01\n\
+             [[light]]\ntype = 'point'\nposition = [1, 1, 0]\nintensity = 0.02\n"
+        ));
+        assert!(scene.has_light_tree());
+        let (mut told, mut chosen) = ([0.0; 2], [0_u32; 2]);
+        for word in (u32::MAX - (1 << 20))..=u32::MAX {
+            let choice = choose_light(&scene, &receivers()[0], word);
+            let light = &scene.lights[choice.light as usize];
+            if light.kind == LIGHT_POINT {
+                let bulb = usize::from(light.a[0] > 0.5);
+                chosen[bulb] += 1;
+                told[bulb] = f64::from(choice.probability) * 2f64.powi(32);
+                assert_eq!(choice.probability, light.probability, "which other functions count by");
+            }
+        }
+        for (chosen, told) in chosen.into_iter().zip(told) {
+            assert!((1..1 << 18).contains(&chosen), "{emission}: {chosen} words");
+            assert_eq!(f64::from(chosen), told, "{emission}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Cameras that move, and renderers whose frames follow them.
 #![allow(dead_code)]
 use glam::{Quat, Vec3};
-use tallow::gpu::{FrameResources, Gpu, Recorder};
+use tallow::gpu::{FrameResources, Gpu, PassTime, Recorder};
 use tallow::layout::{Camera, PixelLight, PixelStats, SurfacePoint};
 use tallow::render::{Moves, Outputs, Renderer, Reproject, Reprojection, Step, carried_samples};
 use tallow::scene::Loaded;
@@ -98,10 +98,10 @@ impl Film {
         begun
     }
 
-    /// Begins a frame from `camera`, and renders nothing.
-    pub fn begin(&mut self, camera: Camera) {
+    /// Begins a frame from `camera`, and renders nothing. Returns the passes that this took.
+    pub fn begin(&mut self, camera: Camera) -> Vec<PassTime> {
         self.renderer.set_camera(camera).unwrap();
-        self.step(&Step::Reproject);
+        self.renderer.run(&mut self.frame, &Step::Reproject).unwrap()
     }
 
     pub fn stats(&self) -> Vec<PixelStats> {

@@ -212,10 +212,12 @@ impl History {
         self.last().is_some_and(|camera| Self::check_camera(&camera).is_ok())
     }
 
-    /// Whether a frame from `camera` can begin with samples of the last: where nothing has changed, with all of any camera.
+    /// Whether a frame from `camera` can begin with samples of the last: where nothing has changed, with all of any camera. Where only the
+    /// camera is followed, a change of anything else ends them.
     pub(super) fn leads_to(&self, camera: &Camera) -> bool {
         let still = !self.has_changed() && self.last() == Some(*camera);
-        still || self.is_of_points() && Self::check_camera(camera).is_ok()
+        let is_followed = self.probes.is_some() || !self.has_changed();
+        still || is_followed && self.is_of_points() && Self::check_camera(camera).is_ok()
     }
 
     fn last(&self) -> Option<Camera> {

@@ -125,8 +125,19 @@ pub fn list(scene: &mut Scene) -> Result<()> {
     Ok(())
 }
 
-/// The tree over the lights that [`is_in_tree`]; it has a root even if none is.
-fn tree(scene: &Scene) -> Vec<LightNode> {
+/// Rounds the probabilities of lights outside of the tree to whole words of 32 bits, one at least, by which they are chosen.
+fn in_whole_words(scene: &mut Scene) {
+    const WORDS: f32 = 4294967296.0;
+    let outside: Vec<bool> = scene.lights.iter().map(|light| !is_in_tree(scene, light)).collect();
+    for (light, _) in scene.lights.iter_mut().zip(outside).filter(|(_, outside)| *outside) {
+        light.probability = (light.probability * WORDS).round().max(1.0) / WORDS;
+    }
+}
+
+/// The tree over the lights that [`is_in_tree`]; it has a root even if none is. Those outside get probabilities of whole words.
+fn tree(scene: &mut Scene) -> Vec<LightNode> {
+    in_whole_words(scene);
+    let scene = &*scene;
     let (mut lamps, mut outside, mut probability) = (Vec::new(), Vec::new(), 0.0);
     let powers: Vec<f64> = scene.lights.par_iter().map(|light| power_in_tree(scene, light)).collect();
     for ((index, light), power) in (0..).zip(&scene.lights).zip(powers) {
