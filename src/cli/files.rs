@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 /// A scene's name: that of its file, or of the folder of a file called "scene", as many are.
 pub fn scene_name(path: &Path) -> OsString {
     let stem = path.file_stem().unwrap_or("image".as_ref()); // `.` and `..` have no file name
-    let folder = path.parent().and_then(Path::file_name).filter(|_| stem == "scene");
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let folder = whole.parent().and_then(Path::file_name).filter(|_| stem == "scene");
     folder.unwrap_or(stem).to_owned()
 }
 
@@ -231,8 +232,13 @@ mod tests {
 
     #[test]
     fn scenes_have_names() {
-        let paths = ["scenes/bust/scene.toml", "a/scene.gltf", "a/room.toml", "scene.toml", ".."];
+        let paths = ["scenes/bust/scene.toml", "a/scene.gltf", "a/room.toml", "/scene.toml", ".."];
         assert_eq!(paths.map(|path| scene_name(Path::new(path))), ["bust", "a", "room", "scene", "image"]);
+        let here = std::env::current_dir().unwrap();
+        assert_eq!(
+            ["scene.toml", "./scene.toml"].map(|path| scene_name(Path::new(path))),
+            [here.file_name().unwrap(); 2]
+        );
     }
 
     #[test]

@@ -85,8 +85,7 @@ const RGBE: &[u8] = b"#?RGBE\n";
 /// # Errors
 /// A message about what is wrong with the header.
 pub fn claim(bytes: &[u8]) -> Result<Claim, String> {
-    const KNOWN: [ImageFormat; 3] = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Hdr];
-    if !format(bytes).is_some_and(|format| KNOWN.contains(&format)) {
+    if format(bytes).is_none() {
         return Err("is no EXR, PNG, JPEG or HDR file".to_owned());
     }
     let decoder = reader(bytes, TEXTS)?.into_decoder().map_err(plain)?;
@@ -116,12 +115,17 @@ pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
     reader(bytes, TEXTS + claim.bytes)?.decode().map_err(plain)
 }
 
-/// What the first bytes say that a picture is.
+/// What the first bytes say that a picture is; `None` if it is not read.
 pub fn format(bytes: &[u8]) -> Option<ImageFormat> {
     match bytes.starts_with(RGBE) {
         true => Some(ImageFormat::Hdr),
-        false => image::guess_format(bytes).ok(),
+        false => image::guess_format(bytes).ok().filter(|format| is_read(*format)),
     }
+}
+
+/// Whether files of this format are read, those of EXR elsewhere.
+pub fn is_read(format: ImageFormat) -> bool {
+    matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr | ImageFormat::OpenExr)
 }
 
 /// Whether a file is a PNG of 16 bits a channel, which its first chunk says behind the size.

@@ -207,3 +207,23 @@ fn noise_that_a_lens_shows_and_a_filter_leaves_is_told() {
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(text.matches("where the lens blurs").count(), 1, "{text}");
 }
+
+/// Of a scene that is named without a folder.
+#[test]
+fn files_of_the_working_folder_are_found_in_another_case() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    write("a.obj", b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
+    write("A.MTL", b"newmtl a\nmap_Kd C.PNG\n");
+    let mut png = Vec::new();
+    ::image::RgbImage::from_pixel(1, 1, ::image::Rgb([255, 0, 0]))
+        .write_to(&mut std::io::Cursor::new(&mut png), ::image::ImageFormat::Png)
+        .unwrap();
+    write("c.png", &png);
+    for scene in ["a.obj", "./a.obj"] {
+        let output = run(&folder, &format!("render {scene} {SMALL} --spp 1 -o a.exr --json"));
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let warnings = json["warnings"].to_string();
+        assert!(warnings.contains("found as") && !warnings.contains("no such"), "{scene}: {warnings}");
+    }
+}

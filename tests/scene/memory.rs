@@ -184,8 +184,8 @@ fn mistakes_are_one_line_with_place_and_remedy() {
     has(mesh(&|m| m.indices.truncate(5)), &["mesh \"wall\"", "5 indices"]);
     has(mesh(&|m| m.normals.truncate(3)), &["mesh \"wall\"", "4 positions but 3 normals"]);
     has(mesh(&|m| m.uvs.push([0.0; 2])), &["mesh \"wall\"", "4 positions but 5 uvs"]);
-    has(error(|d| d.mesh[0].shape = Some(Shape::Cube)), &["mesh \"wall\"", "either"]);
-    has(error(|d| d.mesh[0].data = None), &["mesh \"wall\"", "either"]);
+    has(error(|d| d.mesh[0].shape = Some(Shape::Cube)), &["mesh \"wall\"", "choose one"]);
+    has(error(|d| d.mesh[0].data = None), &["mesh \"wall\"", "needs a file"]);
     has(error(|d| d.bitmap[0].width = 4), &["bitmap \"pictures", "6 texels for 4 x 2"]);
     has(error(|d| d.bitmap[0].height = 0), &["bitmap \"pictures", "3 x 0"]);
     has(error(|d| d.bitmap.push(d.bitmap[0].clone())), &["bitmap \"pictures", "twice"]);

@@ -121,8 +121,12 @@ fn not_placed(name: &String, from: &Description) -> String {
 }
 
 fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a Option<String>>) -> String {
-    let near = description::nearest(name, known.flatten().map(String::as_str)).unwrap_or("(none has a name)");
-    format!("no {kind} \"{name}\" that can be moved: did you mean \"{near}\"?")
+    match description::nearest(name, known.flatten().map(String::as_str)) {
+        Some(near) => format!("no {kind} \"{name}\" that can be moved: did you mean \"{near}\"?"),
+        None => format!(
+            "no {kind} \"{name}\" that can be moved, since none has a name: write name = \"{name}\" in its table"
+        ),
+    }
 }
 
 fn curves(table: &AnimationTable, target: &Target) -> Checked<Vec<(&'static str, Curve)>> {

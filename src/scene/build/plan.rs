@@ -6,7 +6,7 @@ use crate::scene::description::shape::Shape;
 use crate::scene::description::{self, Description, InstanceTable, Key, MeshTable, Numbers, Transform, affine};
 use crate::scene::load::material::Materials;
 use glam::{DAffine3, DMat3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// A mesh and its destination.
 #[derive(Clone, Copy, Debug)]
@@ -76,6 +76,8 @@ struct Planner<'s, 'a> {
     next: u32,
     /// Of a name, the first mesh.
     named: HashMap<&'a str, usize>,
+    /// Names that several meshes have.
+    doubled: HashSet<&'a str>,
     /// By mesh: whether an instance names it.
     instanced: Vec<bool>,
     /// By mesh: whether it is stored as a sphere so far, and whether its instances stretch it, since rays meet a sphere in its
@@ -88,11 +90,13 @@ impl<'s, 'a> Planner<'s, 'a> {
     fn new(sources: &'s Sources<'a>) -> Self {
         let meshes = &sources.description.mesh;
         let named = meshes.iter().enumerate().rev().filter_map(|(i, m)| Some((m.name.as_deref()?, i)));
+        let (mut known, names) = (HashSet::new(), meshes.iter().filter_map(|m| m.name.as_deref()));
         Self {
             sources,
             plan: Plan::default(),
             next: sources.description.instance.len() as u32,
             named: named.collect(),
+            doubled: names.filter(|name| !known.insert(*name)).collect(),
             instanced: vec![false; meshes.len()],
             exact: meshes.iter().map(is_sphere).collect(),
             stretched: meshes.iter().map(|m| is_sphere(m) && !is_even(&m.transform.0)).collect(),
@@ -111,6 +115,9 @@ impl<'s, 'a> Planner<'s, 'a> {
             };
             return Err(sources.at(place, what));
         };
+        if self.doubled.contains(table.mesh.as_str()) {
+            return Err(sources.at(place, "two meshes have this name: rename one"));
+        }
         self.instanced[mesh] = true;
         let affine = invertible(sources, table.transform, place)?;
         let material = table.material.as_ref().map(|m| sources.material(m, place)).transpose()?;

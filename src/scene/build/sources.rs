@@ -118,8 +118,10 @@ impl<'a> Sources<'a> {
     fn check(&self, mesh: &MeshTable) -> Result<()> {
         let place = || format!("mesh \"{}\"", mesh_name(mesh));
         let sources = [mesh.file.is_some(), mesh.shape.is_some(), mesh.data.is_some()];
-        if sources.into_iter().filter(|there| *there).count() != 1 {
-            return Err(self.at(place(), "needs either a file or a shape (or, in memory, data)"));
+        match sources.into_iter().filter(|there| *there).count() {
+            0 => return Err(self.at(place(), "needs a file or a shape (or, in memory, data)")),
+            1 => {}
+            _ => return Err(self.at(place(), "has more than one of a file, a shape and data in memory: choose one")),
         }
         if mesh.clip.is_some() {
             return Err(self.at(place(), "has a clip, which is for glTF files"));

@@ -10,6 +10,7 @@ use crate::memory;
 use crate::scene::description::mesh::Mesh;
 use crate::scene::description::{self, MeshTable};
 use crate::scene::load::material::has_normal_map;
+use crate::scene::load::mesh_file::Format;
 use crate::scene::load::obj::ObjFile;
 use crate::scene::load::obj_part::Part;
 use crate::scene::{BYTES_OF_TRIANGLE, MAX_COORDINATE, Scene};
@@ -161,6 +162,8 @@ struct Addition<'a, 'l> {
     first: u32,
     /// Whether some texture reads second coordinates, and whether some material needs tangents.
     second: bool,
+    /// Whether colours of vertices count: those of an OBJ file where its table gives it no material.
+    colors: bool,
     tangents: bool,
     /// What splits lamps, and how often they may be quartered.
     lamps: (Lamps<'l>, u32),
@@ -180,7 +183,9 @@ impl<'a, 'l> Addition<'a, 'l> {
         let tangents = stretched || materials.list.iter().any(has_normal_map);
         let place = format!("mesh \"{}\"", mesh_name(table));
         let material = override_of(sources, job)?;
-        Ok(Self { job: *job, table, place, material, placement, first, second, tangents, lamps })
+        let is_obj = table.file.as_deref().is_some_and(|file| Format::of(file) == Format::Obj);
+        let colors = !(is_obj && material.is_some());
+        Ok(Self { job: *job, table, place, material, placement, first, second, colors, tangents, lamps })
     }
 
     /// Adds the triangles; returns the names of the objects, and what it takes to deform them.
@@ -253,9 +258,12 @@ impl<'a, 'l> Addition<'a, 'l> {
     fn check_group(&self, sources: &Sources, file: &ObjFile) -> Result<()> {
         match self.table.group.as_ref().filter(|g| !file.parts.iter().any(|part| part.name == **g)) {
             Some(group) => {
-                let names = file.parts.iter().map(|part| part.name.as_str());
-                let near = description::nearest(group, names).unwrap_or("(none)");
-                Err(sources.at(&self.place, format!("no group \"{group}\": did you mean \"{near}\"?")))
+                let names = file.parts.iter().map(|part| part.name.as_str()).filter(|name| !name.is_empty());
+                let what = match description::nearest(group, names) {
+                    Some(near) => format!("no group \"{group}\": did you mean \"{near}\"?"),
+                    None => format!("no group \"{group}\", since it has none: leave it out"),
+                };
+                Err(sources.at(&self.place, what))
             }
             None => Ok(()),
         }
@@ -317,7 +325,7 @@ impl<'a, 'l> Addition<'a, 'l> {
         for (t, triangle) in (0..).zip(triangles) {
             let triangle = triangle.map(|i| i as usize);
             let extras = Extras {
-                colors: corners(&mesh.colors, triangle),
+                colors: corners(&mesh.colors, triangle).filter(|_| self.colors),
                 uvs: corners(&mesh.uvs2, triangle).filter(|_| self.second),
                 tangents: corners(&mesh.tangents, triangle).filter(|_| self.tangents),
             };

@@ -73,9 +73,11 @@ impl Camera {
             v => Err(format!("{name} is {v}: choose 0 or a positive number of at most {:e}", MAX_COORDINATE)),
         };
         let to_target = self.target.map_or(1.0, |t| (DVec3::from(t) - position).dot(forward).max(1e-6));
-        let focus_distance = positive("focus_distance", self.focus_distance.unwrap_or(to_target as f32))?;
-        if focus_distance == 0.0 {
-            return Err("focus_distance is 0: choose a positive number".into());
+        let focus_distance = self.focus_distance.unwrap_or(to_target as f32);
+        if !(focus_distance > 0.0 && focus_distance <= MAX_COORDINATE as f32) {
+            return Err(format!(
+                "focus_distance is {focus_distance}: choose a number above 0 and up to {MAX_COORDINATE:e}"
+            ));
         }
         Ok(layout::Camera {
             position: position.as_vec3().to_array(),

@@ -139,11 +139,16 @@ pub struct InstanceTable {
 /// # Errors
 /// [`Error::Input`] with line, key and, for an unknown key, the nearest known one.
 pub(super) fn parse(path: &Path, text: &str) -> Result<Description> {
-    toml::from_str(text).map_err(|e| {
+    let description: Description = toml::from_str(text).map_err(|e| {
         let start = e.span().map_or(0, |s| s.start).min(text.len());
         let line = 1 + text.as_bytes()[..start].iter().filter(|&&b| b == b'\n').count();
         Error::input_at(path, format!("line {line}"), explain(e.message()))
-    })
+    })?;
+    let Camera { world_from_camera, position, up, .. } = &description.camera;
+    if world_from_camera.is_some() && (position.is_some() || up.is_some()) {
+        return Err(Error::input_at(path, "[camera]", "has both world_from_camera and position or up: choose one"));
+    }
+    Ok(description)
 }
 
 impl Description {

@@ -22,6 +22,10 @@ fn any_case(directory: &Path, written: &str) -> Option<PathBuf> {
 }
 
 fn entry_like(directory: &Path, name: &str) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(directory).ok()?;
-    entries.flatten().find(|e| e.file_name().to_str().is_some_and(|f| f.eq_ignore_ascii_case(name))).map(|e| e.path())
+    let listed = if directory.as_os_str().is_empty() { Path::new(".") } else { directory };
+    let entries = std::fs::read_dir(listed).ok()?;
+    entries
+        .flatten()
+        .find(|e| e.file_name().to_str().is_some_and(|f| f.eq_ignore_ascii_case(name)))
+        .map(|e| directory.join(e.file_name()))
 }

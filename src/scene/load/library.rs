@@ -2,8 +2,10 @@
 use super::find::find_file;
 use super::material::Materials;
 use super::mtl::{self, Mtl};
+use super::obj_part::{NO_VERTEX_COLOR, Part};
 use crate::error::{Error, Result};
 use crate::image::input;
+use crate::layout::NONE;
 use crate::memory;
 use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
@@ -43,10 +45,30 @@ impl Library {
         *self.grey.get_or_insert_with(|| materials.push("(default)", Materials::plain([0.6; 3])))
     }
 
+    /// Whether a part wears that grey.
+    pub fn is_grey(&self, part: &Part) -> bool {
+        self.grey == Some(part.material)
+    }
+
     /// Index of the white that the colours of vertices are seen in.
     pub fn white(&mut self) -> u32 {
         let materials = &mut self.materials;
         *self.white.get_or_insert_with(|| materials.push("(vertex colours)", Materials::plain([1.0; 3])))
+    }
+
+    /// Gives a part of an OBJ file that wears nothing a material: white, if its vertices have colours, else grey. Colours count there
+    /// alone, since exporters write them beside a material that shows the same. `none` says that the file has others in their place.
+    pub fn color(&mut self, part: &mut Part, none: bool) {
+        let has_colors = !none && part.mesh.colors.iter().any(|color| *color != NO_VERTEX_COLOR);
+        let counts = part.material == NONE && has_colors;
+        if !part.mesh.colors.is_empty() {
+            let colors = &mut part.mesh.to_mut().colors;
+            colors.iter_mut().filter(|color| **color == NO_VERTEX_COLOR).for_each(|color| *color = [1.0; 4]);
+            colors.truncate(if counts { colors.len() } else { 0 });
+        }
+        if part.material == NONE {
+            part.material = if counts { self.white() } else { self.grey() };
+        }
     }
 
     /// The materials of an MTL file, read once however its path is written.

@@ -58,7 +58,8 @@ enum Kind {
     Map,
 }
 
-/// The statements that mean something here, in lower case; as tobj spells them; what follows. `Tr` is 1 - d.
+/// The statements that mean something here, in lower case; as tobj spells them; what follows. `Tr` is 1 - d, and does not count beside one: some
+/// exporters write the same number for both.
 const STATEMENTS: [(&str, &str, Kind); 20] = [
     ("kd", "Kd", Kind::Color),
     ("ks", "Ks", Kind::Color),
@@ -104,15 +105,16 @@ const OPTIONS: [(&str, usize); 13] = [
 /// # Errors
 /// [`Error::Input`] with the line of a statement whose numbers are missing, not numbers, or not finite.
 pub fn parse(path: &Path, text: &str) -> Result<Vec<Mtl>> {
-    let (mut checked, mut within) = (String::new(), false);
+    let (mut checked, mut within, mut has_d) = (String::new(), false, false);
     for (number, line) in Statements::of(text.trim_start_matches('\u{feff}')) {
         let line = line.trim();
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
         if key.eq_ignore_ascii_case("newmtl") {
-            within = !rest.is_empty(); // a material without a name cannot be used
+            (within, has_d) = (!rest.is_empty(), false); // a material without a name cannot be used
             checked.extend(within.then(|| format!("newmtl {rest}\n")));
-        } else if within {
+        } else if within && !(has_d && key.eq_ignore_ascii_case("Tr")) {
+            has_d |= key.eq_ignore_ascii_case("d");
             let place = || format!("line {number}");
             checked += &statement(key, rest).map_err(|what| Error::input_at(path, place(), what))?;
         }
@@ -244,6 +246,11 @@ mod tests {
             (m.block.shininess, m.block.dissolve, m.block.illumination_model),
             (Some(10.0), Some(0.75), Some(2))
         );
+        for both in ["d 1\nTr 1", "Tr 1\nd 1"] {
+            assert_eq!(one(both).block.dissolve, Some(1.0), "{both:?}");
+        }
+        let [_, second] = &parse(Path::new("a.mtl"), "newmtl a\nd 1\nnewmtl b\nTr 1").unwrap()[..] else { panic!() };
+        assert_eq!(second.block.dissolve, Some(0.0));
         let m = one("Pr 0.5\nTf 0.25\nillum -1\nillum 1e20\nmap_norm a.png");
         assert_eq!((m.number("Pr"), m.tf(), m.block.illumination_model), (Some(0.5), Some([0.25; 3]), Some(2)));
         assert_eq!(m.map("norm").unwrap().file, "a.png");

@@ -2,7 +2,7 @@
 use super::blocks::Blocks;
 use super::few;
 use super::library::{self, Library};
-use super::obj_block::{Indices, NO_INDEX, ObjBlock, Statement};
+use super::obj_block::{Indices, NO_COLOR, NO_INDEX, ObjBlock, Statement};
 use super::obj_part::{Corner, NO_EXTRA, Numbering, Part, PartBuilder};
 use crate::error::{Checked, Error, Result};
 use crate::image::input;
@@ -75,6 +75,9 @@ const UNASKED: u64 = 1 << 26;
 /// Approximate bytes of a part with its name. The arrays below count twice, since arrays double when they are full.
 const BYTES_OF_PART: u64 = 400;
 const BYTES_OF_VERTEX: u64 = 2 * (12 + 4);
+/// Of a position of the file, and of a vertex that is made of it.
+const BYTES_OF_COLOR: u64 = 2 * 12;
+const BYTES_OF_CORNER_COLOR: u64 = 2 * 16;
 const BYTES_OF_CORNER: u64 = 2 * (12 + 12 + 8 + 16);
 const BYTES_OF_TRIANGLE: u64 = 2 * 12;
 
@@ -87,6 +90,10 @@ struct Parser<'a> {
     positions: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
+    /// As [`ObjBlock::colors`].
+    colors: Vec<[f32; 3]>,
+    /// As [`ObjBlock::has_others`].
+    has_others: bool,
     parts: Vec<Part<'static>>,
     part: PartBuilder,
     corners: Vec<Corner>,
@@ -118,6 +125,8 @@ impl<'a> Parser<'a> {
             positions: Vec::new(),
             uvs: Vec::new(),
             normals: Vec::new(),
+            colors: Vec::new(),
+            has_others: false,
             parts: Vec::new(),
             part: PartBuilder::default(),
             corners: Vec::new(),
@@ -142,6 +151,14 @@ impl<'a> Parser<'a> {
         self.uvs.extend(block.uvs);
         self.normals.extend(block.normals);
         let [v, vt, vn] = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        if !(block.colors.is_empty() && self.colors.is_empty()) {
+            let before = self.colors.len();
+            self.colors.resize(above[0], NO_COLOR);
+            self.colors.extend(block.colors);
+            self.colors.resize(v, NO_COLOR);
+            self.held += BYTES_OF_COLOR * (v - before) as u64;
+        }
+        self.has_others |= block.has_others;
         self.held +=
             BYTES_OF_VERTEX * (v - above[0]) as u64 + 16 * (vt - above[1]) as u64 + 24 * (vn - above[2]) as u64;
         let mut corners = &block.corners[..];
@@ -199,8 +216,10 @@ impl<'a> Parser<'a> {
         if self.part.differs(has) {
             self.end_part();
         }
-        let made = self.part.face(&self.corners, has, [&self.positions, &self.normals], &self.uvs);
-        self.held += BYTES_OF_TRIANGLE * (self.corners.len() as u64 - 2) + BYTES_OF_CORNER * made as u64;
+        let points = [&self.positions[..], &self.normals, &self.colors];
+        let made = self.part.face(&self.corners, has, points, &self.uvs);
+        let of_corner = BYTES_OF_CORNER + if self.colors.is_empty() { 0 } else { BYTES_OF_CORNER_COLOR };
+        self.held += BYTES_OF_TRIANGLE * (self.corners.len() as u64 - 2) + of_corner * made as u64;
         Ok(())
     }
 
@@ -260,10 +279,11 @@ impl<'a> Parser<'a> {
             let keys: Vec<_> = self.curved.iter().copied().collect();
             self.library.warnings.push(format!("{}: not read: {}", self.path.display(), keys.join(", ")));
         }
-        for part in self.parts.iter_mut().filter(|part| part.material == NONE) {
-            part.material = self.library.grey();
+        for part in &mut self.parts {
+            self.library.color(part, self.has_others);
         }
-        ObjFile { grey: self.grey(), parts: self.parts }
+        let is_grey = self.parts.iter().any(|part| self.library.is_grey(part));
+        ObjFile { grey: self.grey().filter(|_| is_grey), parts: self.parts }
     }
 
     /// The warning about material names that are used but not defined.

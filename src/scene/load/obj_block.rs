@@ -1,6 +1,7 @@
 //! A block of an OBJ file by itself: numbers are read, but what they refer to may lie in blocks before it.
 use super::blocks::Statements;
 use crate::error::Checked;
+use crate::math::srgb::linear_from_srgb;
 
 /// Indices as a face writes them of a position, a texture coordinate and a normal, or [`NO_INDEX`].
 pub type Indices = [i64; 3];
@@ -12,6 +13,10 @@ pub const NO_INDEX: i64 = i64::MIN;
 pub struct ObjBlock {
     /// Values of `v`, `vt` and `vn`.
     pub positions: Vec<[f32; 3]>,
+    /// Linear colours behind the positions, [`NO_COLOR`] where there is none; empty if there are none at all.
+    pub colors: Vec<[f32; 3]>,
+    /// Whether there are numbers in the place of colours that are none.
+    pub has_others: bool,
     /// Texture coordinates.
     pub uvs: Vec<[f32; 2]>,
     /// Normals.
@@ -87,19 +92,32 @@ impl ObjBlock {
         Ok(())
     }
 
-    /// A fourth number is a weight that the others are divided by; five numbers or more end in a colour, which is dropped.
+    /// A fourth number is a weight that the others are divided by; six or seven begin with a position and an sRGB colour from 0 to 1. More
+    /// mean nothing here.
     fn vertex(&mut self, rest: &str) -> Checked {
         let what = "a vertex needs three numbers after v";
         let mut position = numbers(rest, what)?;
         let mut more = rest.split_ascii_whitespace().skip(3).take_while(|word| !word.starts_with('#'));
-        if let (Some(w), None) = (more.next(), more.next()) {
-            let [w]: [f32; 1] = numbers(w, what)?;
-            if w == 0.0 {
-                return Err(mend("the fourth number of a vertex (w) is 0"));
+        match (more.next(), more.next(), more.next(), more.nth(1)) {
+            (Some(w), None, ..) => {
+                let [w]: [f32; 1] = numbers(w, what)?;
+                if w == 0.0 {
+                    return Err(mend("the fourth number of a vertex (w) is 0"));
+                }
+                position = position.map(|v: f32| v / w);
             }
-            position = position.map(|v: f32| v / w);
+            (Some(r), Some(g), Some(b), None) => {
+                let color = color_of([r, g, b]);
+                self.has_others |= color.is_none();
+                self.colors.resize(self.positions.len(), NO_COLOR);
+                self.colors.push(color.unwrap_or(NO_COLOR));
+            }
+            _ => {}
         }
         self.positions.push(position);
+        if !self.colors.is_empty() {
+            self.colors.resize(self.positions.len(), NO_COLOR);
+        }
         Ok(())
     }
 
@@ -114,6 +132,15 @@ impl ObjBlock {
             count => Ok(Statement::Face(count as u32, defined)),
         }
     }
+}
+
+/// In place of the colour of a position that has none.
+pub const NO_COLOR: [f32; 3] = [-1.0; 3];
+
+/// Linear; `None` for what is no colour.
+fn color_of(words: [&str; 3]) -> Option<[f32; 3]> {
+    let [r, g, b] = words.map(|word| word.parse().ok().filter(|v| (0.0..=1.0).contains(v)).map(linear_from_srgb));
+    Some([r?, g?, b?])
 }
 
 /// The indices of `v/vt/vn`.

@@ -1,5 +1,6 @@
 //! Collects a part of an OBJ file: corners, which index positions, texture coordinates and normals separately, become vertices
 //! that have all three.
+use super::obj_block::NO_COLOR;
 use super::triangulate::Triangulator;
 use crate::layout::NONE;
 use crate::scene::description::mesh::Mesh;
@@ -28,6 +29,8 @@ pub struct Part<'a> {
 
 /// Indices of a position, a texture coordinate and a normal.
 pub type Corner = [u32; 3];
+/// The colour of vertices whose positions have none.
+pub const NO_VERTEX_COLOR: [f32; 4] = [NO_COLOR[0], NO_COLOR[1], NO_COLOR[2], 1.0];
 /// In place of a texture coordinate or normal that a corner does not have.
 pub const NO_EXTRA: u32 = u32::MAX;
 
@@ -96,8 +99,9 @@ impl PartBuilder {
         Part { name: self.name.clone(), material: self.material, mesh }
     }
 
-    /// Adds a face of three corners or more; returns how many vertices were made. `points`: positions and normals.
-    pub fn face(&mut self, corners: &[Corner], has: [bool; 2], points: [&[[f32; 3]]; 2], uvs: &[[f32; 2]]) -> usize {
+    /// Adds a face of three corners or more; returns how many vertices were made. `points`: positions, normals, and the positions' colours,
+    /// if there are any.
+    pub fn face(&mut self, corners: &[Corner], has: [bool; 2], points: [&[[f32; 3]]; 3], uvs: &[[f32; 2]]) -> usize {
         let before = self.made.len();
         self.has = has;
         self.latest.resize(points[0].len(), NONE);
@@ -106,6 +110,11 @@ impl PartBuilder {
             let corner = [position, if has[0] { uv } else { NO_EXTRA }, if has[1] { normal } else { NO_EXTRA }];
             let known = if self.numbering == Numbering::Shared { self.known(corner) } else { None };
             let vertex = known.unwrap_or_else(|| {
+                if let Some(&[r, g, b]) = points[2].get(position as usize) {
+                    // Faces before the first colour have none.
+                    self.mesh.colors.resize(self.mesh.positions.len(), NO_VERTEX_COLOR);
+                    self.mesh.colors.push([r, g, b, 1.0]);
+                }
                 self.mesh.positions.push(points[0][position as usize]);
                 self.mesh.uvs.extend(has[0].then(|| uvs[uv as usize]));
                 self.mesh.normals.extend(has[1].then(|| points[1][normal as usize]));

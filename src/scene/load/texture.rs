@@ -5,7 +5,7 @@ mod source;
 use super::find::find_file;
 use super::mapping::Mapping;
 use crate::error::{Checked, Error, Result};
-use crate::image::contained;
+use crate::image::{contained, input};
 use crate::layout::{NONE, TEXTURE_FLOAT, TEXTURE_RGB9E5, TEXTURE_SRGB, Texture};
 use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb_f64;
@@ -114,7 +114,7 @@ impl TextureSet {
         }
     }
 
-    /// Index of the picture, or [`NONE`] with a warning when there is no such file.
+    /// Index of the picture, or [`NONE`] with a warning when there is no such file, or one of a format that is not read.
     pub fn request(&mut self, dir: &Path, file: &str, kind: Kind, mapping: Mapping, warn: &mut Vec<String>) -> u32 {
         let in_memory = self.bitmaps.contains_key(Path::new(file)).then(|| (file.into(), false));
         let Some((path, mended)) = in_memory.or_else(|| find_file(dir, file)) else {
@@ -123,6 +123,11 @@ impl TextureSet {
         };
         if mended {
             warn.push(format!("texture {}: found as {}", dir.join(file).display(), path.display()));
+        }
+        if !self.bitmaps.contains_key(&path) && input::is_of_another_format(&path) {
+            let what = "is no EXR, PNG, JPEG or HDR file; its constant colour is used: save it as PNG";
+            warn.push(format!("texture {}: {what}", path.display()));
+            return NONE;
         }
         let (next, pictures) = (self.wanted.len() as u32, &mut self.pictures);
         *self.index.entry((path, kind, mapping.bits())).or_insert_with_key(|(path, ..)| {

@@ -58,6 +58,35 @@ fn lines_may_continue_and_carry_colours_or_foreign_letters() {
 }
 
 #[test]
+fn vertices_have_the_colours_behind_their_positions() {
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n";
+    let colours = "v 0 1 0 1 0.5 0\nv 0 2 0 1 0 0 1\nv 1 2 0 0 0 1\nf 1 4 5\nf 5 6 4\n";
+    let mut library = Library::default();
+    let mut parts = |text: &str| {
+        let file = parse(Path::new("a.obj"), text.as_bytes(), Numbering::Shared, &mut library).unwrap();
+        let albedo = |part: &Part| library.materials.list[part.material as usize].base_color[0];
+        file.parts.iter().map(|p| (p.mesh.positions.clone(), p.mesh.colors.clone(), albedo(p))).collect::<Vec<_>>()
+    };
+    let all = parts(&format!("{square}{colours}o far\nf 1 2 3\n"));
+    let (positions, colors, seen_in) = &all[0];
+    assert_eq!((positions.len(), colors.len(), *seen_in), (6, 6, 1.0));
+    let of = |position: [f32; 3]| colors[positions.iter().position(|p| *p == position).unwrap()];
+    assert_eq!([of([1.0, 0.0, 0.0]), of([0.0; 3])], [[1.0; 4]; 2], "those above the first colour are white");
+    let [r, g, b, a] = of([0.0, 1.0, 0.0]);
+    assert!(r == 1.0 && (g - 0.214).abs() < 1e-3 && b == 0.0 && a == 1.0, "sRGB: {g}");
+    assert_eq!(of([0.0, 2.0, 0.0]), [1.0, 0.0, 0.0, 1.0], "before an alpha");
+    assert!(all[1].1.is_empty() && all[1].2 == 0.6, "an object without colours");
+    for others in ["v 0 1 0 255 128 0", "v 0 1 0 0 0 -1", "v 0 1 0 0 0 1 1 0 0"] {
+        let all = parts(&format!("{square}{}", colours.replace("v 0 1 0 1 0.5 0", others)));
+        let has_colors = others.split(' ').count() > 8;
+        assert_eq!((!all[0].1.is_empty(), all[0].2), (has_colors, if has_colors { 1.0 } else { 0.6 }), "{others}");
+    }
+    assert!(parts(square)[0].1.is_empty() && parts(square)[0].2 == 0.6, "control: without colours grey");
+    let worn = parts(&format!("{square}usemtl nothing\n{colours}"));
+    assert_eq!(worn.iter().map(|part| part.2).collect::<Vec<_>>(), [1.0], "as if nothing were worn");
+}
+
+#[test]
 fn mistakes_name_their_line() {
     assert_eq!(
         error("f 1 2 5"),

@@ -128,6 +128,29 @@ fn damage_is_an_error_with_the_file() {
     assert!(decode(&whole, "a.jpg", Kind::Color).is_ok(), "control");
 }
 
+/// As for a picture that is not there.
+#[test]
+fn pictures_of_other_formats_leave_the_constant_colour() {
+    let dir = tempfile::tempdir().unwrap();
+    let tiff = b"II*\0\x08\0\0\0 and so on";
+    let of = |name: &str, bytes: &[u8]| {
+        std::fs::write(dir.path().join(name), bytes).unwrap();
+        let (mut set, mut warnings) = (TextureSet::default(), Vec::new());
+        (set.request(dir.path(), name, Kind::Color, Mapping::default(), &mut warnings), warnings)
+    };
+    for (name, bytes) in
+        [("a.tif", &tiff[..]), ("a.TGA", &[0, 0, 2, 0, 0]), ("a.webp", b"RIFF....WEBP"), ("a.psd", b"8BPS")]
+    {
+        let (index, warnings) = of(name, bytes);
+        assert!(index == NONE && warnings.len() == 1, "{name}: {warnings:?}");
+        assert!(warnings[0].contains(name) && warnings[0].contains("its constant colour is used: save it as PNG"));
+    }
+    assert_eq!(of("b.tga", &png(1, 1, &[7, 8, 9])), (0, Vec::new()), "a PNG by another name");
+    // A name without an ending, and a PNG that is none, are mistakes: the file is read, and refused.
+    assert_eq!([of("c", tiff).0, of("c.png", tiff).0], [0; 2]);
+    assert!(decode(tiff, "c.png", Kind::Color).is_err());
+}
+
 #[test]
 fn large_pictures_are_decoded_where_memory_allows() {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
