@@ -55,6 +55,28 @@ fn each_verdict_has_its_exit_code() {
     assert!(stdout(&tallow(&folder, &["--help"])).contains("\n  7    too noisy to say: compare --statistical"));
 }
 
+/// Of a filtered image its samples are tested, which is said wherever the verdict is.
+#[test]
+fn filtered_images_are_told_apart() {
+    let folder = folder();
+    let mut film = image::read(&folder.path().join("a.exr")).unwrap();
+    let samples = film.picture(None).unwrap().pixels;
+    film.add_vec3("Noisy Image", ["R", "G", "B"], &samples);
+    film.metadata.insert("filtered".to_owned(), "auto".to_owned());
+    film.channels.retain(|channel| !["R", "G", "B"].contains(&channel.name.as_str()));
+    film.add_vec3("", ["R", "G", "B"], &vec![[7.0; 3]; film.pixels()]);
+    image::write(&folder.path().join("clean.exr"), &film, &WriteOptions::default()).unwrap();
+    let output = compare(&folder, "a.exr clean.exr --junit a.xml --html a.html");
+    let note = "clean.exr was filtered (auto): what was tested are its samples, the layer \"Noisy Image\".";
+    assert!(output.status.success() && stdout(&output).contains(note), "{output:?}");
+    assert!(stdout(&output).contains("\nthe means of the samples are equal bit for bit\n"), "{output:?}");
+    let text = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    assert!(text("a.xml").contains("b.filtered") && text("a.html").contains("was filtered (auto)"));
+    let json: Value = serde_json::from_slice(&compare(&folder, "a.exr clean.exr --json").stdout).unwrap();
+    assert!(json["b"]["filtered"] == "auto" && json["a"]["filtered"].is_null(), "{json}");
+    assert!(!stdout(&compare(&folder, "a.exr b.exr")).contains("filtered"), "control");
+}
+
 #[test]
 fn all_figures_are_in_the_json() {
     let folder = folder();

@@ -2,6 +2,7 @@
 use super::report::Report;
 use super::words;
 use crate::error::{Error, Result};
+use crate::image::FILTERED;
 use crate::image::significance::{Level, Verdict};
 use quick_junit::{NonSuccessKind, Report as Document, TestCase, TestCaseStatus, TestSuite};
 
@@ -14,7 +15,7 @@ pub fn text(report: &Report) -> Result<String> {
     let [a, b] = report.sides.each_ref().map(|side| side.path.display().to_string());
     let mut suite = TestSuite::new(format!("{a} and {b}"));
     for (name, side) in ["a", "b"].into_iter().zip(report.sides) {
-        for key in ["device", "driver", "cpu"] {
+        for key in ["device", "driver", "cpu", FILTERED] {
             if let Some(value) = side.film.metadata.get(key) {
                 suite.add_property((format!("{name}.{key}").as_str(), value.as_str()));
             }

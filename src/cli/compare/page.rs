@@ -47,6 +47,7 @@ fn texts(report: &Report) -> Vec<String> {
         words::percent(options.false_alarms),
         words::percent(options.accept)
     )];
+    texts.extend(words::filtered(report));
     if report.outcome.left_out > 0 {
         texts.push(format!("{} pixels with fewer than two samples were left out.", report.outcome.left_out));
     }

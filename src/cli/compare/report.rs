@@ -1,7 +1,7 @@
 //! What a test of two renders found, and of which images.
 use crate::error::{Error, Result};
 use crate::image::significance::{Estimate, Options, Outcome, overlay};
-use crate::image::{self, Film, Picture, WriteOptions};
+use crate::image::{self, FILTERED, Film, Picture, WriteOptions};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -52,10 +52,15 @@ impl Side {
         Picture { width: *width, height: *height, pixels: mean.clone() }
     }
 
+    /// The filter behind the samples, whose mean was tested in place of what it made of them.
+    pub fn filter(&self) -> Option<&str> {
+        self.film.metadata.get(FILTERED).map(String::as_str)
+    }
+
     /// What the file says of where it was rendered.
     pub fn origin(&self) -> Value {
-        const KEYS: [&str; 8] =
-            ["software", "scene", "sceneFingerprint", "device", "driver", "cpu", "sampleRanges", "settings"];
+        const KEYS: [&str; 9] =
+            ["software", "scene", "sceneFingerprint", "device", "driver", "cpu", "sampleRanges", "settings", FILTERED];
         let said = |key: &str| Some((key.to_owned(), Value::from(self.film.metadata.get(key)?.clone())));
         let mut origin: serde_json::Map<_, _> = KEYS.iter().filter_map(|key| said(key)).collect();
         origin.insert("file".to_owned(), json!(self.path.display().to_string()));
@@ -64,7 +69,7 @@ impl Side {
 }
 
 impl Report<'_> {
-    /// Whether both images are equal bit for bit.
+    /// Whether both means are equal bit for bit.
     pub fn equal(&self) -> bool {
         self.sides[0].estimate.mean == self.sides[1].estimate.mean
     }

@@ -144,8 +144,11 @@ fn text(report: &Report, args: &Args, full: Option<f32>) -> String {
     if let Verdict::Same { .. } = report.outcome.verdict {
         text += &format!("{}\n", words::verdict(report));
     }
+    let filtered = words::filtered(report);
+    text.extend(filtered.iter().map(|sentence| format!("{}\n", readable(sentence))));
     if report.equal() {
-        text += "the images are equal bit for bit\n";
+        let what = if filtered.is_empty() { "images" } else { "means of the samples" };
+        text += &format!("the {what} are equal bit for bit\n");
     }
     if report.outcome.left_out > 0 {
         text += &format!("{} pixels with fewer than two samples were left out\n", report.outcome.left_out);

@@ -1,5 +1,6 @@
 //! The verdict of a statistical test in words and tables.
-use super::report::Report;
+use super::report::{Report, Side};
+use crate::image::NOISY;
 use crate::image::significance::{Finding, Level, Noise, Outcome, Scale, Verdict};
 use crate::report::table;
 
@@ -16,8 +17,20 @@ const ROWS: usize = 8;
 /// A share in percent, with two significant digits.
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
+    if percent.abs() >= 1e9 {
+        return format!("{percent:.1e} %");
+    }
     let digits = (1.0 - percent.abs().max(1e-4).log10().floor()).clamp(0.0, 4.0) as usize;
     format!("{percent:.digits$} %")
+}
+
+/// What was tested of images that were filtered, a sentence for each.
+pub fn filtered(report: &Report) -> Vec<String> {
+    let of = |side: &Side| {
+        let (path, filter) = (side.path.display(), side.filter()?);
+        Some(format!("{path} was filtered ({filter}): what was tested are its samples, the layer \"{NOISY}\"."))
+    };
+    report.sides.iter().filter_map(of).collect()
 }
 
 /// The verdict in one line.
@@ -54,7 +67,7 @@ fn numbers(report: &Report, times: f64) -> String {
         Noise::SquaredErrors(_) => None,
     });
     let Some((a, b)) = a.zip(b) else { return String::new() };
-    let needed = |n: f64| (n * times).ceil();
+    let needed = |n: f64| whole((n * times).ceil());
     match (a.max(b) - a.min(b)) / a.max(b) < UNEQUAL {
         true => format!(", {} a pixel", needed(a)),
         false => format!(", {} and {} a pixel (fewer if both have equally many)", needed(a), needed(b)),
@@ -101,7 +114,12 @@ pub fn plural(scale: Scale) -> String {
 fn rounded_up(samples: f64) -> String {
     let unit = 10f64.powf(samples.log10().floor() - 1.0);
     let rounded = (samples / unit).ceil() * unit;
-    if rounded < 9.95 { format!("{rounded:.1}") } else { format!("{rounded:.0}") }
+    if rounded < 9.95 { format!("{rounded:.1}") } else { whole(rounded) }
+}
+
+/// A whole number, by its power of ten where nobody counts the digits.
+fn whole(number: f64) -> String {
+    if number < 1e9 { format!("{number:.0}") } else { format!("{number:.1e}") }
 }
 
 /// What was found at every scale, and the regions that differ most surely.
