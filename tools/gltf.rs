@@ -58,6 +58,7 @@ struct Row {
 
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
+    sheet::check(&args.output)?;
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
     let goldens = args.data.join("scenes/gltf-samples/goldens");
     let scenarios = scenario::read(&goldens.join("scenarios.json"))?;

@@ -47,7 +47,7 @@ struct Args {
     /// What to measure; what was published when nothing is named
     #[arg(value_enum)]
     parts: Vec<Part>,
-    /// Folder for renders and the report; renders that it holds are used again
+    /// Folder for renders and the report; renders that it holds of the same commit, program and scene file are used again
     #[arg(short, long, default_value = "out/papers")]
     output: PathBuf,
     /// Render in the papers' sizes, for graphics cards; else in sizes that take a software device minutes

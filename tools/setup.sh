@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced by tools/tallow, tools/test, tools/package and tools/with-ray-query: finds out what is missing, installs it or says how, and finds cargo.
+# Sourced by the scripts beside it and by .ci/run: finds out what is missing, installs it or says how, and finds cargo.
 # Everything that is said goes to stderr, because stdout belongs to the program that is started in the end.
 set -euo pipefail
 

@@ -1,7 +1,7 @@
 //! The sheet of all models: a row of pictures each, below its name.
 use crate::{Row, letters};
-use anyhow::Context;
-use image::{Rgb, RgbImage};
+use anyhow::{Context, ensure};
+use image::{ImageFormat, Rgb, RgbImage};
 use std::path::Path;
 
 /// Rows of pictures are laid out in so many columns.
@@ -11,7 +11,18 @@ const PICTURES: u32 = 6;
 const GAP: u32 = 4;
 const LINE: u32 = 14;
 
-/// Writes the pictures of all models, each `width` pixels wide; higher ones are cut at their lower end.
+/// Refuses a name whose ending is none of those of formats that hold the sheet.
+///
+/// # Errors
+/// For such a name.
+pub fn check(path: &Path) -> anyhow::Result<()> {
+    let format = ImageFormat::from_path(path);
+    let is_known = matches!(format, Ok(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Gif));
+    ensure!(is_known, "{}: the sheet is a .png, .jpg or .gif", path.display());
+    Ok(())
+}
+
+/// Writes the pictures of all models, each `width` pixels wide; higher ones are cut at their lower end, longer names at their right.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -24,7 +35,10 @@ pub fn write(path: &Path, width: u32, rows: &[Row]) -> anyhow::Result<()> {
         // Twice as large as letters are.
         letters::write(&row.name, |x, y| {
             for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                sheet.put_pixel(corner[0] + 2 * x + dx, corner[1] + 2 * y + dy, Rgb([230; 3]));
+                let right = 2 * x + dx;
+                if right < cell[0] - GAP {
+                    sheet.put_pixel(corner[0] + right, corner[1] + 2 * y + dy, Rgb([230; 3]));
+                }
             }
         });
         for (column, (_, picture)) in (0..PICTURES).zip(&row.pictures) {
@@ -43,4 +57,29 @@ pub fn write(path: &Path, width: u32, rows: &[Row]) -> anyhow::Result<()> {
         std::fs::create_dir_all(folder)?;
     }
     sheet.save(path).with_context(|| path.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_wider_than_its_pictures_is_cut() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sheet.png");
+        let row = |name: &str| Row { name: name.to_owned(), pictures: Vec::new() };
+        write(&path, 8, &[row(&"H".repeat(30)), row(&"H".repeat(30))]).unwrap();
+        let sheet = image::open(path).unwrap().into_rgb8();
+        assert_eq!(sheet.dimensions(), (2 * 76, 26));
+        // In the row of the strokes across.
+        let is_written = |x: u32| sheet.get_pixel(x, GAP + 4).0[0] == 230;
+        assert!((76..76 + GAP).all(|x| !is_written(x)) && is_written(76 + GAP));
+    }
+
+    #[test]
+    fn a_file_that_cannot_hold_the_sheet_is_refused() {
+        let is_taken = |name: &str| check(Path::new(name)).is_ok();
+        assert!(["sheet.png", "out/sheet.JPG", "sheet.gif"].into_iter().all(is_taken));
+        assert!(!["sheet.exr", "sheet.hdr", "sheet", "png/sheet"].into_iter().any(is_taken));
+    }
 }

@@ -5,6 +5,7 @@ use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tallow::image::source::Source;
+use xxhash_rust::xxh3::Xxh3Default;
 
 /// A scene with the parameters of its renders.
 #[derive(Clone, Copy)]
@@ -53,11 +54,12 @@ impl View {
     /// When the scene cannot be found or rendered.
     pub fn render(&self, args: &Args, spp: u32, seed: u32, kind: &str, options: &[&str]) -> anyhow::Result<Source> {
         let [width, height] = self.size(args);
+        let scene = self.scene_file(args)?;
         let name = format!("{}-{width}x{height}-depth{}-{spp}spp-seed{seed}{kind}.exr", self.name, self.depth);
-        let file = args.output.join(name);
+        let file = folder(args, &scene)?.join(name);
         if !file.exists() {
             eprintln!("rendering {}", file.display());
-            self.run(args, &file, &[("--spp", spp), ("--seed", seed)], options)?;
+            self.run(args, [&scene, &file], &[("--spp", spp), ("--seed", seed)], options)?;
         }
         Ok(Source::read(&file)?)
     }
@@ -70,10 +72,16 @@ impl View {
         self.render(args, self.reference, 1, "", &[])
     }
 
-    fn run(&self, args: &Args, file: &Path, numbers: &[(&str, u32)], options: &[&str]) -> anyhow::Result<()> {
+    fn run(
+        &self,
+        args: &Args,
+        [scene, file]: [&Path; 2],
+        numbers: &[(&str, u32)],
+        options: &[&str],
+    ) -> anyhow::Result<()> {
         let [width, height] = self.size(args);
         let mut command = Command::new(&args.tallow);
-        command.arg("render").arg(self.scene_file(args)?).arg("-o").arg(file);
+        command.arg("render").arg(scene).arg("-o").arg(file);
         // The papers filter indirect light alone, or all light.
         command.args(["--quiet", "--split", "indirect", "--roulette-depth", "0"]).args(options);
         let own = [("--width", width), ("--height", height), ("--max-depth", self.depth)];
@@ -84,5 +92,43 @@ impl View {
             bail!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim());
         }
         Ok(())
+    }
+}
+
+/// The folder for renders of a scene file: those of another commit, program or scene are not taken for them.
+fn folder(args: &Args, scene: &Path) -> anyhow::Result<PathBuf> {
+    let mut hash = Xxh3Default::new();
+    for file in [args.tallow.as_path(), scene] {
+        hash.update(&std::fs::read(file).with_context(|| file.display().to_string())?);
+    }
+    let folder = args.output.join(format!("{}-{:016x}", args.commit, hash.digest()));
+    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    Ok(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use std::fs;
+
+    #[test]
+    fn renders_of_another_commit_program_or_scene_lie_elsewhere() {
+        let out = tempfile::tempdir().unwrap();
+        let [program, scene] = ["tallow", "scene.toml"].map(|name| out.path().join(name));
+        for file in [&program, &scene] {
+            fs::write(file, "old").unwrap();
+        }
+        let of = |commit| {
+            let [output, program] = [out.path(), program.as_path()].map(|path| path.to_str().unwrap());
+            let words = ["papers", "--data", ".", "--commit", commit, "--output", output, "--tallow", program];
+            folder(&Args::parse_from(words), &scene).unwrap()
+        };
+        let first = of("a");
+        assert!(first.is_dir() && of("a") == first && of("b") != first);
+        fs::write(&scene, "new").unwrap();
+        let second = of("a");
+        fs::write(&program, "new").unwrap();
+        assert!(second != first && ![first, second].contains(&of("a")));
     }
 }

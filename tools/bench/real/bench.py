@@ -5,7 +5,7 @@
 
 PEERS is the folder that $TALLOW_DATA/peers/setup.sh installed into (run `. PEERS/env.sh` first). Several binaries are compared
 with the first one. Start-up is kept out: Mitsuba renders once before it is timed, and Tallow's wall time is the difference
-between two renders. Device time is the sum over passes of the median dispatch. Rates by processor time count the seconds of
+between two renders. Device time is that of all passes of the longer one. Rates by processor time count the seconds of
 all cores, as if they had been busy all the time: other processes disturb them least. `layers` renders all layers of an EXR
 file, otherwise radiance alone. Image means tell whether all render the same."""
 import argparse
@@ -66,8 +66,7 @@ class Tallow:
         """Megasamples a second by wall, processor and device time."""
         one, three = self.render(self.spp), self.render(3 * self.spp)
         between = [2 * self.spp * self.megapixels / (three[key] - one[key]) for key in ("seconds", "processor")]
-        device = sum(p["median_ms"] * p["calls"] for p in three["passes"]) * 1e-3
-        return *between, 3 * self.spp * self.megapixels / device
+        return *between, 3 * self.spp * self.megapixels / (1e-3 * three["gpu_ms"])
 
     def mean(self):
         import mitsuba as mi
@@ -135,8 +134,10 @@ def main():
     parser.add_argument("--scenes", default=",".join(SCENES), help="default: %(default)s")
     parser.add_argument("--rounds", type=int, default=3)
     args = parser.parse_args()
-    if "TALLOW_DATA" not in os.environ:
+    data = os.environ.get("TALLOW_DATA", "")
+    if not os.path.isdir(data):
         sys.exit("TALLOW_DATA names no folder of outside data")
+    os.environ["TALLOW_DATA"] = os.path.abspath(data)  # cargo is started in another folder
     binaries = args.tallow or [str(ROOT / "target/release/tallow")]
     names = args.scenes.split(",")
     with tempfile.TemporaryDirectory() as folder:

@@ -1,5 +1,5 @@
-//! Frames of a camera that moves through a scene, or of what a scene animates: the error of each, how much it flickers,
-//! and how different all look.
+//! Frames of a camera that moves through a scene, and of what the scene animates, if anything: the error of each, how much it
+//! flickers, and how different all look.
 use crate::film::{Arm, Film, carries};
 use crate::reference::Reference;
 use crate::{View, plot, seen};
@@ -47,7 +47,7 @@ pub struct Args {
 /// Frames that fill the history; what is measured begins behind them.
 const FIRST: usize = 8;
 
-/// The camera of a frame: of the scene's own, or on its way.
+/// The camera of a frame, on its way from the scene's own. It moves whether the scene does or not.
 fn camera(args: &Args, scene: &Loaded, frame: u32) -> Result<Camera> {
     let first = scene.camera([args.view.width, args.view.height])?;
     let turn = Quat::from_axis_angle(Vec3::from(first.up).normalize(), (args.turn * frame as f32).to_radians());

@@ -27,7 +27,7 @@ struct Args {
 enum Command {
     /// The experiment of Schalk 2018: the camera turns by 100 degrees in steps, then rests; error against time after the last step
     Turn(turn::Args),
-    /// Frames of a camera that moves, or of what a scene animates: error and flicker of each, and how they look
+    /// Frames of a camera that moves, and of what the scene animates: error and flicker of each, and how they look
     Frames(frames::Args),
 }
 

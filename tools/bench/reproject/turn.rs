@@ -5,6 +5,7 @@ use crate::reference::Reference;
 use crate::{View, plot};
 use anyhow::{Result, ensure};
 use glam::{Quat, Vec3};
+use std::iter::repeat_n;
 use tallow::gpu::{Gpu, total_ms};
 use tallow::layout::{Camera, vec3};
 use tallow::render::{Carriage, Reproject, ReprojectOverrides};
@@ -24,7 +25,7 @@ pub struct Args {
     /// Degrees that the camera turns by
     #[arg(long, default_value_t = 100.0)]
     degrees: f32,
-    /// Degrees of a step
+    /// Degrees of a step; the last one is what is left
     #[arg(long, value_delimiter = ',', default_values_t = [5.0, 10.0, 20.0, 50.0])]
     steps: Vec<f32>,
     /// Samples of a pixel for each step
@@ -63,6 +64,13 @@ fn turned(first: &Camera, degrees: f32) -> Camera {
     Camera { right: of(first.right), up: of(first.up), forward: of(first.forward), ..*first }
 }
 
+/// The angle of each frame until the camera rests: a step more each from 0 on, and all degrees in the end.
+fn angles(degrees: f32, step: f32) -> Vec<f32> {
+    // What rounding leaves is no step.
+    let count = (degrees / step - 1e-3).ceil() as u32;
+    (0..count).map(|k| step * k as f32).chain([degrees]).collect()
+}
+
 /// What was seen of an arm from the last step on: milliseconds since then and the error, frame by frame.
 pub struct Line {
     pub name: String,
@@ -94,13 +102,14 @@ fn measure(gpu: &Gpu, args: &Args, step: f32, name: String, arm: Arm, reference:
     let scene = args.view.load()?;
     let first = args.start(&scene)?;
     let mut film = Film::new(gpu, &scene, arm, args.spp)?;
-    let count = (args.degrees / step).round() as u32;
+    let angles = angles(args.degrees, step);
+    let last = angles.len() as u32 - 1;
+    let at_rest = repeat_n(args.degrees, args.rest as usize);
     let (mut points, mut clock, mut carriage, mut frame_ms, mut carrying_ms) = (Vec::new(), 0.0, None, 0.0, 0.0);
     let (mut means, mut weight) = (Vec::new(), 0.0);
-    for k in 0..=count + args.rest {
-        let camera = turned(&first, args.degrees.min(step * k as f32));
-        let times = film.shoot(camera, None, k)?;
-        if k < count {
+    for (k, angle) in (0..).zip(angles.into_iter().chain(at_rest)) {
+        let times = film.shoot(turned(&first, angle), None, k)?;
+        if k < last {
             continue;
         }
         let ms = total_ms(&times);
@@ -114,7 +123,7 @@ fn measure(gpu: &Gpu, args: &Args, step: f32, name: String, arm: Arm, reference:
         let shown = if arm.carries.is_none() { &means } else { &picture.pixels };
         let shown = tallow::image::Picture { pixels: shown.clone(), ..picture };
         points.push((clock, reference.error(&shown)));
-        if k == count && arm.carries.is_some() {
+        if k == last && arm.carries.is_some() {
             carriage = Some(film.renderer.carriage()?);
             carrying_ms = total_ms(times.iter().filter(|pass| carries(pass)));
         }
@@ -208,4 +217,18 @@ fn print(step: f32, lines: &[Line]) {
         "dropped",
     ];
     println!("\nsteps of {step} degrees\n{}", table::text(&head, &lines.iter().map(row).collect::<Vec<_>>()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_ends_at_its_last_degree_whatever_its_steps_are() {
+        assert_eq!(angles(20.0, 50.0), [0.0, 20.0]);
+        assert_eq!(angles(100.0, 30.0), [0.0, 30.0, 60.0, 90.0, 100.0]);
+        let twenty: Vec<_> = (0..=20).map(|k| 5.0 * k as f32).collect();
+        assert_eq!(angles(100.0, 5.0), twenty);
+        assert_eq!(angles(0.0, 5.0), [0.0]);
+    }
 }
