@@ -55,9 +55,13 @@ vec3 perturbed_normal(Surface s, Slopes slopes) {
     vec3 dpdu = slopes.u, dpdv = slopes.v;
     vec2 uv = uv_of(s, image);
     Texture map = Texture_load(textures, image);
-    vec2 extent = abs(map.scale);
-    if (FX_TEXTURE_MODES) extent = sqrt(map.scale * map.scale + map.shear.yx * map.shear.yx);
-    vec2 texel = 1.0 / (vec2(map.width, map.height) * max(extent, 1e-6));
+    // Texels that pass along u and along v: the picture is read at uv * scale + uv.yx * shear.
+    vec2 size = vec2(map.width, map.height), extent = size * abs(map.scale);
+    if (FX_TEXTURE_MODES) {
+        vec2 across = (size * map.shear).yx;
+        extent = sqrt(extent * extent + across * across);
+    }
+    vec2 texel = 1.0 / max(extent, 1e-6 * size);
     // The normal, or differences of heights half a texel to either side: along u, then along v.
     vec3 value;
     vec2 rise = vec2(0.0);

@@ -140,9 +140,9 @@ fn normal_from_map(scene: &Scene, s: &Surface, image: u32, scale: f32, slopes: S
 fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, [dpdu, dpdv]: [Vec3; 2]) -> Vec3 {
     let image = material.bump_texture;
     let texture = &scene.textures[image as usize];
-    let turned = vec2(texture.scale[0].hypot(texture.shear[1]), texture.scale[1].hypot(texture.shear[0]));
-    let scale = turned.max(Vec2::splat(1e-6));
-    let texel = 1.0 / (vec2(texture.width as f32, texture.height as f32) * scale);
+    let size = vec2(texture.width as f32, texture.height as f32);
+    let [along, across] = [texture.scale, texture.shear].map(|factors| size * Vec2::from(factors));
+    let texel = 1.0 / vec2(along.x.hypot(across.y), along.y.hypot(across.x)).max(1e-6 * size);
     let uv = uv_of(scene, s, image);
     let height = |offset| texture_sample(scene, image, uv + offset).x;
     let rise = |half: Vec2| height(half) - height(-half);

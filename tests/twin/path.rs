@@ -575,3 +575,35 @@ fn either_way_to_find_light_gives_the_same_picture() {
     let wrong = mean(&scene, Strategy::Both, 1024);
     assert!(!wrong.agrees(&light), "control: {wrong:?} {light:?}");
 }
+
+/// A height map that a turn of its coordinates turns, beside a mesh whose own are turned. A step along u passes texels of the picture's
+/// height then, which the pictures have more or fewer of than of its width.
+#[test]
+fn heights_of_turned_pictures_have_the_slopes_of_turned_coordinates() {
+    let quad = |uvs: [[i32; 2]; 4]| {
+        let corners = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\n";
+        let uvs: String = uvs.iter().map(|[u, v]| format!("vt {u} {v}\n")).collect();
+        format!("{corners}{uvs}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n")
+    };
+    for (width, height) in [(256, 4), (4, 256)] {
+        let wave = move |x: u32, y: u32| (std::f32::consts::TAU * 5.0 * (x + y) as f32 / 256.0).sin();
+        let place = Workplace::new()
+            .sky("heights.exr", width, height, wave)
+            .file("plain.obj", &quad([[0, 0], [1, 0], [1, 1], [0, 1]]))
+            .file("turned.obj", &quad([[1, 1], [1, 2], [0, 2], [0, 1]]));
+        let scene = |mesh: &str, turn: u32| {
+            place.scene(&format!(
+                "[environment]\nradiance = 1\n[[material]]\nname = 'a'\nbump_scale = 0.01\n\
+                 bump = {{ file = 'heights.exr', rotate = {turn} }}\n[[mesh]]\nfile = '{mesh}'\nmaterial = 'a'\n"
+            ))
+        };
+        let [by_map, by_mesh, not] = [("plain.obj", 90), ("turned.obj", 0), ("plain.obj", 0)].map(|(m, t)| scene(m, t));
+        let normal = |scene: &Loaded, i: u8| {
+            let barycentric = vec2(0.3, 0.005 * f32::from(i));
+            surface_at(scene, &Hit { t: 1.0, triangle: 0, instance: NONE, barycentric }).normal
+        };
+        let off = |a: &Loaded, b: &Loaded| (0..100).map(|i| (normal(a, i) - normal(b, i)).length()).fold(0.0, f32::max);
+        assert!(off(&by_map, &by_mesh) < 1e-3, "{width}x{height}: {}", off(&by_map, &by_mesh));
+        assert!(off(&by_map, &not) > 0.05, "control, {width}x{height}: {}", off(&by_map, &not));
+    }
+}
