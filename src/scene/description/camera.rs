@@ -159,7 +159,7 @@ fn overview(target: DVec3, low: DVec3, high: DVec3, tan: [f64; 2]) -> DVec3 {
 fn frame_from_matrix(rows: &[f64; 16]) -> Result<Frame, String> {
     let refused = || "world_from_camera is not an invertible row-major affine matrix (last row 0 0 0 1)".to_owned();
     let m = DMat4::from_cols_array(rows).transpose();
-    if !m.is_finite() || m.row(3).truncate() != DVec3::ZERO || m.determinant().abs() < 1e-30 {
+    if !m.is_finite() || m.row(3).truncate() != DVec3::ZERO || m.w_axis.w == 0.0 {
         return Err(refused());
     }
     let position = m.w_axis.truncate() / m.w_axis.w;

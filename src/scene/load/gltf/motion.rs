@@ -1,4 +1,5 @@
 //! What the animations of a file move: nodes move each other, and with them instances, lights, cameras and the joints of skins.
+use super::camera::view_of;
 use super::clip::Channel;
 use super::deform::{Skin, deformed};
 use super::light;
@@ -8,7 +9,7 @@ use crate::error::Result;
 use crate::scene::animation::{Keyed, Mover};
 use crate::scene::description::{Camera, LightTable, Mesh, Transform};
 use crate::scene::pose::{Pose, Vertices};
-use glam::{DAffine3, DMat4};
+use glam::DAffine3;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -114,8 +115,7 @@ pub struct CameraMotion {
 
 impl Mover for CameraMotion {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
-        let world = DMat4::from(self.motion.worlds(seconds)[self.node]);
-        let rows = Some(world.transpose().to_cols_array());
+        let rows = Some(view_of(&self.motion.worlds(seconds)[self.node]));
         pose.camera = Some(Camera { world_from_camera: rows, ..self.camera.clone() });
         Ok(())
     }
