@@ -354,6 +354,9 @@ fn find(candidates: &[Candidate], wanted: &str) -> Option<usize> {
         return Some(index).filter(|&index| index < candidates.len());
     }
     let wanted = wanted.to_lowercase();
+    if wanted.trim().is_empty() {
+        return None; // it would be a part of every name
+    }
     candidates.iter().position(|c| c.info.name.to_lowercase().contains(&wanted))
 }
 

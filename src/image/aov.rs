@@ -103,6 +103,11 @@ impl Plane<'_> {
     }
 }
 
+/// A number of samples; 0 for what is none.
+fn sound(samples: f32) -> f32 {
+    if samples.is_finite() { samples.max(0.0) } else { 0.0 }
+}
+
 /// The AOVs of a film, each three values per pixel.
 pub struct Aovs<'a> {
     /// The film that holds them.
@@ -169,6 +174,7 @@ impl<'a> Aovs<'a> {
         }
         found.samples_of_all = told.or_else(|| samples_of_head(film, found.colour[0]));
         found.check_colour()?;
+        found.check_samples();
         Ok(found)
     }
 
@@ -185,6 +191,15 @@ impl<'a> Aovs<'a> {
             self.notes.push(format!("colour: NaN or infinite in {count} of {all} pixels, {what}"));
         }
         Ok(())
+    }
+
+    /// Leaves out numbers of samples where no pixel has any: nothing would be left to filter.
+    fn check_samples(&mut self) {
+        let has_some = |plane: &Plane| (0..self.film.pixels()).any(|i| self.holds(i) && sound(plane.at(i)[0]) > 0.0);
+        if self.planes.get(&Aov::Samples).is_some_and(|plane| !has_some(plane)) {
+            self.planes.remove(&Aov::Samples);
+            self.notes.push("samples: none in any pixel, which is not believed".to_owned());
+        }
     }
 
     fn take(&mut self, known: &Known, channels: Option<[&'a Channel; 3]>) -> Result<(), String> {
@@ -229,7 +244,7 @@ impl<'a> Aovs<'a> {
     /// Samples of a pixel, as far as the file or the user tells: its own, or those of all, which pbrt and Cycles write into the head.
     pub fn samples(&self, pixel: usize) -> Option<f32> {
         let share = || self.scalar(Aov::ShareOfSamples, pixel).unwrap_or(1.0);
-        self.scalar(Aov::Samples, pixel).or_else(|| Some(share() * self.samples_of_all?))
+        self.scalar(Aov::Samples, pixel).map(sound).or_else(|| Some(share() * self.samples_of_all?))
     }
 
     /// Squared standard error of a pixel's radiance, if the file has it: pbrt stores the variance of one sample.
@@ -452,5 +467,21 @@ mod tests {
         let line = Aovs::find(&file, &wrong).map(|_| ()).unwrap_err();
         assert!(line.contains("depth") && line.contains("\"far\"") && line.contains("kd.R"), "{line}");
         assert!(Aovs::find(&film("a.X b.Y"), &Names::new()).is_err(), "no colour");
+    }
+
+    #[test]
+    fn numbers_of_samples_are_believed_where_there_are_some() {
+        let of = |samples: [f32; 4]| {
+            let mut film = Film::new(2, 2);
+            film.add_vec3("", ["R", "G", "B"], &[[1.0; 3]; 4]);
+            film.add("samples", Samples::F32(samples.to_vec()));
+            let found = Aovs::find(&film, &Names::new()).unwrap();
+            let told = found.notes.iter().any(|note| note.contains("none in any pixel"));
+            ([0, 1, 2, 3].map(|i| found.samples(i)), told)
+        };
+        for none in [[0.0; 4], [-1.0, 0.0, f32::NAN, f32::NEG_INFINITY]] {
+            assert_eq!(of(none), ([None; 4], true));
+        }
+        assert_eq!(of([8.0, -1.0, f32::NAN, 0.0]), ([Some(8.0), Some(0.0), Some(0.0), Some(0.0)], false));
     }
 }

@@ -35,6 +35,14 @@ fn no_loader_and_no_driver_are_told_apart() {
     fails(&folder, &[], &["no Vulkan loader", "libvulkan1"]);
 }
 
+/// As of a variable that is not set: it is a part of every name.
+#[test]
+fn a_device_without_a_name_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = command(folder.path(), &format!("render {} --spp 1 --width 8 --height 8", scene()));
+    complains(&command.args(["--device", ""]).output().unwrap(), 4, &["no device is called \"\": choose one of 0: "]);
+}
+
 #[test]
 fn effects_are_listed_without_a_driver() {
     let folder = tempfile::tempdir().unwrap();
