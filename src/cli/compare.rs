@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// does not explain; exit code 0 says that they are the same, 1 that they differ, 7 that they are too noisy to say.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Image to judge (EXR, PNG, JPEG or HDR)
+    /// Image to judge (EXR, PNG, JPEG, HDR, TGA or BMP)
     a: PathBuf,
     /// Its reference
     b: PathBuf,

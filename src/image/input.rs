@@ -1,4 +1,5 @@
 //! Opening and reading files, with checks of their kind and of free memory.
+use super::photo::{HEAD, NO_IMAGE};
 use crate::error::{Error, Result};
 use crate::memory;
 use image::ImageFormat;
@@ -39,21 +40,19 @@ pub fn read_text(path: &Path, times: u64) -> Result<Vec<u8>> {
     }
 }
 
-/// Number of bytes that identify the format of an image.
-const HEAD: u64 = 16;
-
-/// Whether a file is of a format that is not read, by its ending and its first bytes. One that ends as those that are read, or has no ending,
-/// is damaged instead.
+/// Whether a file is of a format that is not read, by its ending and its first bytes. One that ends as EXR, PNG, JPEG and HDR files do, or has
+/// no ending, is damaged instead.
 pub fn is_of_another_format(path: &Path) -> bool {
-    let is_read = ImageFormat::from_path(path).is_ok_and(super::photo::is_read);
-    let others = path.extension().is_some() && !is_read;
+    use ImageFormat::{Hdr, Jpeg, OpenExr, Png};
+    let has_mark = ImageFormat::from_path(path).is_ok_and(|format| matches!(format, Png | Jpeg | Hdr | OpenExr));
+    let others = path.extension().is_some() && !has_mark;
     let head = || File::open(path).and_then(|mut file| head(&mut file));
     others && head().is_ok_and(|head| !super::is_image(&head))
 }
 
 fn head(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
-    file.take(HEAD).read_to_end(&mut head)?;
+    file.take(HEAD as u64).read_to_end(&mut head)?;
     Ok(head)
 }
 
@@ -66,7 +65,7 @@ pub fn read_image(path: &Path) -> Result<Vec<u8>> {
     let head = head(&mut file).map_err(|e| Error::input(path, remedy(&e)))?;
     match super::is_image(&head) {
         true => read_rest(path, file, head, 1),
-        false => Err(Error::input(path, "is no EXR, PNG, JPEG or HDR file")),
+        false => Err(Error::input(path, NO_IMAGE)),
     }
 }
 

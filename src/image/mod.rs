@@ -21,7 +21,7 @@ pub use claim::Claim;
 pub use film::{Channel, FILTERED, Film, NOISY, Picture, SOFTWARE, Samples, Window};
 use frame::Frame;
 use output::Stream;
-pub(crate) use photo::{BAND, bands, check_end, has_16_bits, picture};
+pub(crate) use photo::{BAND, NO_IMAGE, bands, check_end, has_16_bits, picture};
 #[cfg(feature = "cli")]
 pub(crate) use photo::{codes, encode_png};
 use std::cell::Cell;
@@ -98,7 +98,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     output::check(path)
 }
 
-/// Reads an EXR, PNG, JPEG or HDR file, recognised by its content, into linear values. Those of EXR and HDR are as they are stored,
+/// Reads an EXR, PNG, JPEG, HDR, TGA or BMP file, recognised by its content, into linear values. Those of EXR and HDR are as they are stored,
 /// whatever primaries a file names: [`Film::rec709`] converts them.
 ///
 /// # Errors

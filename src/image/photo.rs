@@ -1,4 +1,4 @@
-//! Reading of PNG, JPEG and Radiance HDR files, and writing of PNG and HDR.
+//! Reading of PNG, JPEG, Radiance HDR, TGA and BMP files, and writing of PNG and HDR.
 use super::WriteOptions;
 use super::claim::Claim;
 use super::film::{Film, Picture, Samples};
@@ -14,7 +14,8 @@ use std::borrow::Cow;
 use std::io::{Cursor, ErrorKind};
 
 /// Largest number of pixels that one byte of a file can hold. PNG packs 8 pixels into a byte, and deflate packs 1032 bytes
-/// into one. JPEG needs a bit for 64 pixels of one component, which can be subsampled by 4 in each direction; HDR holds a
+/// into one. TGA packs 128 into two bytes, and BMP
+/// with its runs, which may leave out all that is empty, is taken for as good. JPEG needs a bit for 64 pixels of one component, which can be subsampled by 4 in each direction; HDR holds a
 /// line of 2^16 pixels in 12 bytes.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
 /// Largest number of bytes for colour profiles and texts.
@@ -86,7 +87,7 @@ const RGBE: &[u8] = b"#?RGBE\n";
 /// A message about what is wrong with the header.
 pub fn claim(bytes: &[u8]) -> Result<Claim, String> {
     if format(bytes).is_none() {
-        return Err("is no EXR, PNG, JPEG or HDR file".to_owned());
+        return Err(NO_IMAGE.to_owned());
     }
     let decoder = reader(bytes, TEXTS)?.into_decoder().map_err(plain)?;
     let (width, height) = decoder.dimensions();
@@ -104,7 +105,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     film_from(&picture(bytes)?)
 }
 
-/// Decodes a PNG, JPEG or HDR file without converting its values.
+/// Decodes a PNG, JPEG, HDR, TGA or BMP file without converting its values.
 ///
 /// # Errors
 /// A message about what is wrong with the data, or that they need more memory than is free.
@@ -115,17 +116,41 @@ pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
     reader(bytes, TEXTS + claim.bytes)?.decode().map_err(plain)
 }
 
+/// What is told of a file that is no image, or of a kind that is not read.
+pub const NO_IMAGE: &str = "is no EXR, PNG, JPEG, HDR, TGA or BMP file";
+
 /// What the first bytes say that a picture is; `None` if it is not read.
 pub fn format(bytes: &[u8]) -> Option<ImageFormat> {
     match bytes.starts_with(RGBE) {
         true => Some(ImageFormat::Hdr),
-        false => image::guess_format(bytes).ok().filter(|format| is_read(*format)),
+        false => match image::guess_format(bytes) {
+            Ok(format) => Some(format).filter(|format| is_read(*format)),
+            Err(_) => is_tga(bytes).then_some(ImageFormat::Tga),
+        },
     }
 }
 
 /// Whether files of this format are read, those of EXR elsewhere.
-pub fn is_read(format: ImageFormat) -> bool {
-    matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr | ImageFormat::OpenExr)
+fn is_read(format: ImageFormat) -> bool {
+    use ImageFormat::{Bmp, Hdr, Jpeg, OpenExr, Png, Tga};
+    matches!(format, Png | Jpeg | Hdr | OpenExr | Tga | Bmp)
+}
+
+/// Number of bytes from which the format is told.
+pub const HEAD: usize = 18;
+
+/// Whether a file begins as TGA files do, which have no mark of their own: the kinds of colours and of packing that there are, a size, and
+/// bits of a pixel.
+fn is_tga(bytes: &[u8]) -> bool {
+    let Some(&[_, palette, kind, _, _, _, _, entry, _, _, _, _, w0, w1, h0, h1, bits, _]) = bytes.first_chunk::<HEAD>()
+    else {
+        return false;
+    };
+    let by_palette = matches!(kind, 1 | 9);
+    let known = (by_palette || matches!(kind, 2 | 3 | 10 | 11)) && palette <= 1 && (!by_palette || palette == 1);
+    let entries = palette == 0 || matches!(entry, 15 | 16 | 24 | 32);
+    let bits = if by_palette { matches!(bits, 8 | 16) } else { matches!(bits, 8 | 15 | 16 | 24 | 32) };
+    known && entries && bits && [w0, w1] != [0; 2] && [h0, h1] != [0; 2]
 }
 
 /// Whether a file is a PNG of 16 bits a channel, which its first chunk says behind the size.
@@ -138,7 +163,8 @@ fn reader(bytes: &[u8], memory: u64) -> Result<ImageReader<Cursor<Cow<'_, [u8]>>
         Some(rest) => Cow::Owned([RADIANCE, rest].concat()),
         None => Cow::Borrowed(bytes),
     };
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| plain(e.into()))?;
+    let format = format(&bytes).ok_or(NO_IMAGE)?;
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(memory);
     reader.limits(limits);

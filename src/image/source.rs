@@ -17,7 +17,7 @@ pub struct Unread {
 }
 
 impl Unread {
-    /// Reads an EXR, PNG, JPEG or HDR file.
+    /// Reads an image file of any kind that [`super::read`] does.
     ///
     /// # Errors
     /// As [`super::read`].
@@ -57,7 +57,7 @@ pub struct Source {
 pub type Replaced<'a> = [(&'a str, &'a [f32])];
 
 impl Source {
-    /// Reads an EXR, PNG, JPEG or HDR file.
+    /// Reads an image file of any kind that [`super::read`] does.
     ///
     /// # Errors
     /// As [`super::read`].

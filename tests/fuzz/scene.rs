@@ -138,10 +138,10 @@ fn small_png() -> Vec<u8> {
     bytes.into_inner()
 }
 
-fn small_jpeg() -> Vec<u8> {
+fn small(format: ImageFormat) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let picture = image::RgbImage::from_fn(9, 7, |x, y| image::Rgb([x as u8 * 20, y as u8 * 30, 5]));
-    picture.write_to(&mut bytes, ImageFormat::Jpeg).expect("encoded");
+    picture.write_to(&mut bytes, format).expect("encoded");
     bytes.into_inner()
 }
 
@@ -201,7 +201,18 @@ proptest! {
     }
 
     #[test]
-    fn jpeg(bytes in damaged(small_jpeg())) {
+    fn jpeg(bytes in damaged(small(ImageFormat::Jpeg))) {
+        feed("a.jpg", &bytes, PHOTO);
+    }
+
+    // Told by what they hold, whatever their name.
+    #[test]
+    fn tga(bytes in damaged(small(ImageFormat::Tga))) {
+        feed("a.jpg", &bytes, PHOTO);
+    }
+
+    #[test]
+    fn bmp(bytes in damaged(small(ImageFormat::Bmp))) {
         feed("a.jpg", &bytes, PHOTO);
     }
 
@@ -221,7 +232,7 @@ fn the_undamaged_files_load() {
     let dir = tempfile::tempdir().unwrap();
     let save = |name: &str, bytes| std::fs::write(dir.path().join(name), bytes).unwrap();
     save("a.png", small_png());
-    save("a.jpg", small_jpeg());
+    save("a.jpg", small(ImageFormat::Jpeg));
     save("sky.hdr", small_hdr());
     save("sky.exr", small_exr());
     let load = |text: &str| Scene::parse(&Path::new(dir.path()).join("s.toml"), text).unwrap();

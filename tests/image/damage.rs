@@ -41,15 +41,20 @@ fn exr_in_parts(compression: exr::prelude::Compression) -> Vec<u8> {
 }
 
 fn jpeg() -> Vec<u8> {
+    encoded(::image::ImageFormat::Jpeg)
+}
+
+fn encoded(format: ::image::ImageFormat) -> Vec<u8> {
     let rgb = ::image::RgbImage::from_fn(SIZE, SIZE, |x, y| ::image::Rgb([x as u8 * 9, y as u8 * 9, 77]));
     let mut out = std::io::Cursor::new(Vec::new());
-    rgb.write_to(&mut out, ::image::ImageFormat::Jpeg).unwrap();
+    rgb.write_to(&mut out, format).unwrap();
     out.into_inner()
 }
 
 static FILES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     use exr::prelude::Compression;
     let mut files = vec![written("a.exr"), written("a.png"), written("a.hdr"), jpeg()];
+    files.extend([::image::ImageFormat::Tga, ::image::ImageFormat::Bmp].map(encoded));
     files.extend([Compression::PIZ, Compression::RLE, Compression::PXR24, Compression::B44].map(exr_in_parts));
     files
 });

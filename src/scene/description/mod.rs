@@ -70,7 +70,7 @@ pub struct Description {
 pub struct EnvironmentTable {
     /// Constant radiance, W/(m^2 sr); default 1.
     pub radiance: Option<Rgb>,
-    /// Latitude-longitude image (HDR, EXR, PNG, JPEG), in place of `radiance`.
+    /// Latitude-longitude image (HDR, EXR, PNG, JPEG, TGA, BMP), in place of `radiance`.
     pub file: Option<PathBuf>,
     /// Latitude-longitude image in memory in place of `file`, linear Rec. 709.
     #[serde(skip)]

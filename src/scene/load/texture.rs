@@ -5,7 +5,7 @@ mod source;
 use super::find::find_file;
 use super::mapping::Mapping;
 use crate::error::{Checked, Error, Result};
-use crate::image::{contained, input};
+use crate::image::{NO_IMAGE, contained, input};
 use crate::layout::{NONE, TEXTURE_FLOAT, TEXTURE_RGB9E5, TEXTURE_SRGB, Texture};
 use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb_f64;
@@ -125,7 +125,7 @@ impl TextureSet {
             warn.push(format!("texture {}: found as {}", dir.join(file).display(), path.display()));
         }
         if !self.bitmaps.contains_key(&path) && input::is_of_another_format(&path) {
-            let what = "is no EXR, PNG, JPEG or HDR file; its constant colour is used: save it as PNG";
+            let what = format!("{NO_IMAGE}; its constant colour is used: save it as PNG");
             warn.push(format!("texture {}: {what}", path.display()));
             return NONE;
         }
@@ -167,7 +167,7 @@ impl TextureSet {
     /// Reads every picture.
     ///
     /// # Errors
-    /// [`Error::Input`] with the file that is truncated, damaged, or in a form other than PNG, JPEG, EXR and HDR.
+    /// [`Error::Input`] with the file that is truncated, damaged, or of a kind that is not read.
     pub fn decode(&self) -> Result<Decoded> {
         self.decode_after(Decoded::default())
     }

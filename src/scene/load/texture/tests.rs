@@ -128,6 +128,25 @@ fn damage_is_an_error_with_the_file() {
     assert!(decode(&whole, "a.jpg", Kind::Color).is_ok(), "control");
 }
 
+#[test]
+fn tga_and_bmp_hold_what_png_does() {
+    let picture = image::RgbImage::from_fn(5, 3, |x, y| image::Rgb([50 * x as u8, 80 * y as u8, 7]));
+    let of = |bytes: &[u8], name: &str| decode(bytes, name, Kind::Color).map(|decoded| decoded.texels);
+    let expected = of(&encoded(&picture, image::ImageFormat::Png), "a.png").unwrap();
+    for (format, name) in [(image::ImageFormat::Tga, "a.tga"), (image::ImageFormat::Bmp, "a.bmp")] {
+        let bytes = encoded(&picture, format);
+        assert_eq!(of(&bytes, name).unwrap(), expected, "{name}");
+        assert!(of(&bytes[..bytes.len() - 20], name).is_err(), "{name} without its end");
+    }
+    // As 3ds Max and Photoshop pack them: rows from below, runs of one colour, blue first.
+    let packed = [0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 2, 0, 24, 0, 0x82, 1, 2, 3, 0x82, 4, 5, 6];
+    let expected = [[0xff040506; 3], [0xff010203; 3]].concat();
+    assert_eq!(of(&packed, "b.tga").unwrap(), expected);
+    let mut odd = packed;
+    odd[7] = 24; // bits of a palette that is not there
+    assert_eq!(of(&odd, "b.tga").unwrap(), expected);
+}
+
 /// As for a picture that is not there.
 #[test]
 fn pictures_of_other_formats_leave_the_constant_colour() {
@@ -138,14 +157,18 @@ fn pictures_of_other_formats_leave_the_constant_colour() {
         let (mut set, mut warnings) = (TextureSet::default(), Vec::new());
         (set.request(dir.path(), name, Kind::Color, Mapping::default(), &mut warnings), warnings)
     };
-    for (name, bytes) in
-        [("a.tif", &tiff[..]), ("a.TGA", &[0, 0, 2, 0, 0]), ("a.webp", b"RIFF....WEBP"), ("a.psd", b"8BPS")]
-    {
+    for (name, bytes) in [
+        ("a.tif", &tiff[..]),
+        ("a.GIF", b"GIF89a and so on"),
+        ("a.tga", b"no TGA"),
+        ("a.webp", b"RIFF....WEBP"),
+        ("a.psd", b"8BPS"),
+    ] {
         let (index, warnings) = of(name, bytes);
         assert!(index == NONE && warnings.len() == 1, "{name}: {warnings:?}");
         assert!(warnings[0].contains(name) && warnings[0].contains("its constant colour is used: save it as PNG"));
     }
-    assert_eq!(of("b.tga", &png(1, 1, &[7, 8, 9])), (0, Vec::new()), "a PNG by another name");
+    assert_eq!(of("b.tif", &png(1, 1, &[7, 8, 9])), (0, Vec::new()), "a PNG by another name");
     // A name without an ending, and a PNG that is none, are mistakes: the file is read, and refused.
     assert_eq!([of("c", tiff).0, of("c.png", tiff).0], [0; 2]);
     assert!(decode(tiff, "c.png", Kind::Color).is_err());
