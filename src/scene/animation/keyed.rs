@@ -4,7 +4,7 @@ use super::curve::Curve;
 use crate::error::Result;
 use crate::scene::description::{Camera, LightTable, LightType, Rgb, Transform, affine};
 use crate::scene::pose::{EnvironmentChange, MaterialChange, Pose};
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 
 /// A thing that keys move: what it is where no key says otherwise, and its number.
 #[derive(Clone, Debug)]
@@ -122,19 +122,19 @@ impl Keyed {
     }
 
     /// Where keys put what otherwise is at `rest`.
-    pub fn place(&self, rest: &Transform, at: f64) -> DAffine3 {
+    pub fn place(&self, rest: &Transform, at: f64) -> Transform {
         if let Some(placed) = self.find("transform", at).and_then(|rows| affine(&rows)) {
-            return placed;
+            return placed.into();
         }
         let translation = self.three("translate", at).map_or(rest.0.translation, DVec3::from);
         let [scale, rotation] = [self.find("scale", at), self.find("rotate", at)];
         if scale.is_none() && rotation.is_none() {
-            return DAffine3 { translation, ..rest.0 }; // which may have shear
+            return rest.moved_to(translation); // which may have shear
         }
         let (was, turned) = rest.steps().unwrap_or((DVec3::ONE, DQuat::IDENTITY));
         let scale = self.three("scale", at).map_or(was, DVec3::from);
         let rotation = rotation.map_or(turned, |q| DQuat::from_slice(&q));
-        DAffine3::from_scale_rotation_translation(scale, rotation, translation)
+        Transform::of_steps(scale, rotation, translation)
     }
 
     fn material(&self, at: f64) -> MaterialChange {
@@ -153,7 +153,7 @@ impl Mover for Keyed {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
         match &self.target {
             Target::Camera(rest) => pose.camera = Some(self.camera(rest, seconds)),
-            Target::Placement(number, rest) => pose.instances.push((*number, self.place(rest, seconds).into())),
+            Target::Placement(number, rest) => pose.instances.push((*number, self.place(rest, seconds).0.into())),
             Target::Node => {}
             Target::Light(number, rest) => pose.lights.push((*number, self.light(rest, seconds))),
             Target::Material(number) => pose.materials.push((*number, self.material(seconds))),

@@ -170,8 +170,9 @@ fn frame_from_matrix(rows: &[f64; 16]) -> Result<Frame, String> {
 /// Right, up and forward; `None` where they are no three directions. Uneven scales of a node's parents bring shear.
 fn axes(m: &DMat4) -> Option<[DVec3; 3]> {
     let axis = |i: usize, across: &[DVec3]| {
-        let column = m.col(i).truncate();
-        across.iter().fold(column, |v, other| v.reject_from_normalized(*other)).try_normalize()
+        let column = m.col(i).truncate().try_normalize()?;
+        let rest = across.iter().fold(column, |v, other| v.reject_from_normalized(*other));
+        rest.try_normalize().filter(|_| rest.length() > 1e-9) // less is rounding
     };
     let back = axis(2, &[])?;
     let up = axis(1, &[back])?;

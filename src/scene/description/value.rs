@@ -106,6 +106,16 @@ impl Transform {
         Self(DAffine3::from_scale_rotation_translation(scale, rotation, translation), Some((scale, rotation)))
     }
 
+    /// The same elsewhere.
+    pub fn moved_to(self, translation: DVec3) -> Self {
+        Self(DAffine3 { translation, ..self.0 }, self.1)
+    }
+
+    /// Scale and rotation that it was made of; `None` for a matrix.
+    pub fn made_of(&self) -> Option<(DVec3, DQuat)> {
+        self.1
+    }
+
     /// Scale and rotation: those that it was made of, or those of a matrix without shear, of which several with negative scales are the same.
     pub fn steps(&self) -> Option<(DVec3, DQuat)> {
         self.1.or_else(|| {

@@ -4,7 +4,7 @@ use crate::scene::MAX_COORDINATE;
 use crate::scene::animation::Mover;
 use crate::scene::description::settings::Settings;
 use crate::scene::description::{Camera, Film, FovAxis};
-use glam::{DAffine3, DMat3, DMat4, DVec3};
+use glam::{DAffine3, DMat4};
 use gltf_json::camera::Type;
 use gltf_json::validation::Checked;
 use std::ops::RangeInclusive;
@@ -28,30 +28,18 @@ pub struct Named {
 /// The shapes that films may have, width over height.
 const SHAPES: RangeInclusive<f32> = 0.125..=8.0;
 
-/// Where a camera stands at a node, and looks: rows of its matrix. The scale of nodes does not count: they mirror no view, and may flatten one
-/// axis, which follows from the two others.
-pub fn view_of(world: &DAffine3) -> [f64; 16] {
-    let m = world.matrix3;
-    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::try_normalize);
-    let axes = match (x, y, z) {
-        (_, Some(y), Some(z)) => [y.cross(z), y, z],
-        (Some(x), None, Some(z)) => [x, z.cross(x), z],
-        (Some(x), Some(y), None) => [x, y, x.cross(y)],
-        _ => [m.x_axis, m.y_axis, m.z_axis],
-    };
-    let [x, y, z] = axes;
-    DMat4::from(DAffine3 { matrix3: DMat3::from_cols(x, y, z), ..*world }).transpose().to_cols_array()
-}
-
-/// The camera that `node` holds, placed by `world`: it looks along the node's -z axis, +y is up. The scale of nodes does not
-/// count. A shape that no film should have is left to the defaults, and so is, with a warning, what no camera can see.
-pub fn of_node(asset: &Asset, node: usize, world: &DAffine3, warnings: &mut Vec<String>) -> Option<Named> {
+/// The camera that `node` holds, placed by [`super::node::Tree::views`]: it looks along the node's -z axis, +y is up. A shape that no film should have is left to the defaults, and so is, with a warning, what no camera can see.
+pub fn of_node(asset: &Asset, node: usize, view: &DAffine3, warnings: &mut Vec<String>) -> Option<Named> {
     let holder = &asset.root.nodes[node];
     let index = holder.camera?.value();
     let camera = &asset.root.cameras[index];
     let named = camera.name.as_ref().or(holder.name.as_ref()).filter(|name| !name.is_empty());
     let name = named.map_or_else(|| format!("camera {index}"), |name| one_line(name));
-    let mut table = Camera { world_from_camera: Some(view_of(world)), fov_axis: FovAxis::Y, ..Camera::default() };
+    let mut table = Camera {
+        world_from_camera: Some(DMat4::from(*view).transpose().to_cols_array()),
+        fov_axis: FovAxis::Y,
+        ..Camera::default()
+    };
     let shape = match (&camera.type_, &camera.orthographic, &camera.perspective) {
         (Checked::Valid(Type::Orthographic), Some(flat), _) => {
             let height = 2.0 * f64::from(flat.ymag.abs());
@@ -75,22 +63,4 @@ pub fn of_node(asset: &Asset, node: usize, world: &DAffine3, warnings: &mut Vec<
         (film.width, film.height) = (Some((height as f32 * shape).round() as u32), Some(height));
     }
     Some(Named { name, camera: table, film, mover: None, node })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use glam::{DQuat, dvec3};
-
-    #[test]
-    fn scales_of_nodes_neither_mirror_a_view_nor_flatten_it() {
-        let (turn, place) = (DQuat::from_rotation_y(0.5), dvec3(1.0, 2.0, 3.0));
-        let of = |scale| view_of(&DAffine3::from_scale_rotation_translation(scale, turn, place));
-        let plain = of(dvec3(1.0, 1.0, 1.0));
-        assert_eq!(plain, DMat4::from_rotation_translation(turn, place).transpose().to_cols_array());
-        for scale in [dvec3(-1.0, 1.0, 1.0), dvec3(2.0, 1e-11, 3.0), dvec3(1.0, 1.0, 0.0), dvec3(0.0, 2.0, 2.0)] {
-            let off = of(scale).iter().zip(plain).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(off < 1e-12, "{scale}: {off}");
-        }
-    }
 }

@@ -65,7 +65,8 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Key
         surfaces.map(|surface| primitive::bytes(&asset, surface).saturating_add(tangent::bytes(&asset, surface)));
     let bytes = bytes.fold(0, u64::saturating_add);
     memory::need(path.display(), bytes)?;
-    let (worlds, lights) = (tree.worlds(&tree.locals), light::read(&asset, &mut model.warnings)?);
+    let (worlds, views) = (tree.worlds(&tree.locals), tree.views(&tree.locals));
+    let lights = light::read(&asset, &mut model.warnings)?;
     let channels = clip::read(&asset, &tree, clip, &mut model.warnings)?;
     let keyed = nodes_of(&asset, keys)?;
     let moved = Moved::new(&tree, &channels, keyed.iter().map(|(node, _)| *node));
@@ -78,7 +79,7 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Key
             moved_lights.extend(moved.nodes[node].then(|| MovedLight { number, node, table: table.clone() }));
             model.description.light.push(table);
         }
-        model.cameras.extend(camera::of_node(&asset, node, &worlds[node], &mut model.warnings));
+        model.cameras.extend(camera::of_node(&asset, node, &views[node], &mut model.warnings));
     }
     let placed = placer.finish(&mut model.description, &mut model.warnings)?;
     let moves = moved.nodes;

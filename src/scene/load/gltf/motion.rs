@@ -1,5 +1,4 @@
 //! What the animations of a file move: nodes move each other, and with them instances, lights, cameras and the joints of skins.
-use super::camera::view_of;
 use super::clip::Channel;
 use super::deform::{Skin, deformed};
 use super::light;
@@ -9,7 +8,7 @@ use crate::error::Result;
 use crate::scene::animation::{Keyed, Mover};
 use crate::scene::description::{Camera, LightTable, Mesh, Transform};
 use crate::scene::pose::{Pose, Vertices};
-use glam::DAffine3;
+use glam::{DAffine3, DMat4};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -70,12 +69,17 @@ pub struct Motion {
 impl Motion {
     /// World transforms of all nodes at a time.
     fn worlds(&self, seconds: f64) -> Vec<DAffine3> {
+        self.tree.worlds(&self.locals(seconds))
+    }
+
+    /// The same of each relative to its parent.
+    fn locals(&self, seconds: f64) -> Vec<Local> {
         let mut locals = self.tree.locals.clone();
         self.channels.iter().for_each(|channel| channel.apply(seconds, &mut locals));
         for (node, keys) in &self.keyed {
-            locals[*node] = Local::Matrix(keys.place(&locals[*node].transform(), seconds));
+            locals[*node] = keys.place(&locals[*node].transform(), seconds).into();
         }
-        self.tree.worlds(&locals)
+        locals
     }
 }
 
@@ -115,7 +119,8 @@ pub struct CameraMotion {
 
 impl Mover for CameraMotion {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
-        let rows = Some(view_of(&self.motion.worlds(seconds)[self.node]));
+        let view = self.motion.tree.views(&self.motion.locals(seconds))[self.node];
+        let rows = Some(DMat4::from(view).transpose().to_cols_array());
         pose.camera = Some(Camera { world_from_camera: rows, ..self.camera.clone() });
         Ok(())
     }

@@ -2,7 +2,7 @@
 use super::asset::Asset;
 use crate::error::Result;
 use crate::scene::description::Transform;
-use glam::{DAffine3, DMat4, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use gltf_json::scene::Node;
 
 /// The transform of a node relative to its parent.
@@ -39,18 +39,49 @@ impl Local {
         self.transform().0
     }
 
+    /// The turn alone. Of a matrix, its own z and y axes say it, and the third one where one of them has no length; with fewer it counts
+    /// as none.
+    fn turn(&self) -> DQuat {
+        let m = match self {
+            Self::Steps { rotation, .. } => return unit(*rotation),
+            Self::Matrix(matrix) => matrix.matrix3,
+        };
+        let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::try_normalize);
+        let axes = match (x, y, z) {
+            (_, Some(y), Some(z)) => [y.cross(z), y, z],
+            (Some(x), None, Some(z)) => [x, z.cross(x), z],
+            (Some(x), Some(y), None) => [x, y, x.cross(y)],
+            _ => return DQuat::IDENTITY,
+        };
+        // Shear leaves an angle between axes: z stays, and y is what is across it.
+        let across = |v: DVec3| v.reject_from_normalized(axes[2]).try_normalize();
+        let up = across(axes[1]).unwrap_or_else(|| axes[2].any_orthonormal_vector());
+        DQuat::from_mat3(&DMat3::from_cols(up.cross(axes[2]), up, axes[2]))
+    }
+
     /// The same, with the steps that it is made of.
     pub fn transform(&self) -> Transform {
         match *self {
             Self::Matrix(matrix) => matrix.into(),
-            Self::Steps { translation, rotation, scale } => {
-                let length = rotation.length();
-                let usable = length.is_finite() && length > 1e-30;
-                let turn = if usable { rotation * (1.0 / length) } else { DQuat::IDENTITY };
-                Transform::of_steps(scale, turn, translation)
-            }
+            Self::Steps { translation, rotation, scale } => Transform::of_steps(scale, unit(rotation), translation),
         }
     }
+}
+
+impl From<Transform> for Local {
+    fn from(transform: Transform) -> Self {
+        let translation = transform.0.translation;
+        match transform.made_of() {
+            Some((scale, rotation)) => Self::Steps { translation, rotation, scale },
+            None => Self::Matrix(transform.0),
+        }
+    }
+}
+
+/// A rotation without length or with NaN counts as none.
+fn unit(rotation: DQuat) -> DQuat {
+    let length = rotation.length();
+    if length.is_finite() && length > 1e-30 { rotation * (1.0 / length) } else { DQuat::IDENTITY }
 }
 
 /// The nodes of a file, all trees of which are known to end.
@@ -137,5 +168,69 @@ impl Tree {
             worlds[node] = self.parents[node].map_or(local, |parent| worlds[parent] * local);
         }
         worlds
+    }
+
+    /// Where cameras at the nodes stand and look: the place of each node, and its and its parents' turns. Their scales do not count, as
+    /// glTF 2.0 has it.
+    pub fn views(&self, locals: &[Local]) -> Vec<DAffine3> {
+        let mut turns = vec![DQuat::IDENTITY; locals.len()];
+        for &node in &self.order {
+            let turn = locals[node].turn();
+            turns[node] = self.parents[node].map_or(turn, |parent| turns[parent] * turn);
+        }
+        let place = |(turn, world): (DQuat, DAffine3)| DAffine3::from_rotation_translation(turn, world.translation);
+        turns.into_iter().zip(self.worlds(locals)).map(place).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::dvec3;
+
+    #[test]
+    fn matrices_turn_views_as_their_axes_lie() {
+        let turn = DQuat::from_rotation_y(0.5) * DQuat::from_rotation_x(0.25);
+        let of = |m: DMat3| Local::Matrix(DAffine3::from_mat3(m)).turn();
+        let axes = DMat3::from_quat(turn);
+        for scale in
+            [DVec3::ONE, dvec3(-1.0, 1.0, 1.0), dvec3(0.0, 2.0, 3.0), dvec3(1.0, 0.0, 3.0), dvec3(2.0, 1.0, 0.0)]
+        {
+            let found = of(axes * DMat3::from_diagonal(scale));
+            assert!(found.dot(turn).abs() > 1.0 - 1e-12, "{scale}: {found}");
+        }
+        let shear = DMat3::from_cols(DVec3::X, dvec3(0.0, 1.0, 0.5), DVec3::Z);
+        assert!(of(axes * shear).dot(turn).abs() > 1.0 - 1e-12);
+        assert_eq!(of(DMat3::ZERO), DQuat::IDENTITY);
+        let keyed = Local::from(Transform::of_steps(dvec3(1.0, -1.0, 0.0), turn, DVec3::ZERO));
+        assert!(keyed.turn().dot(turn).abs() > 1.0 - 1e-12, "the steps of keys are kept");
+    }
+
+    #[test]
+    fn scales_of_nodes_neither_mirror_a_view_nor_flatten_it() {
+        let steps = |scale: DVec3, angle: f64| Local::Steps {
+            translation: dvec3(0.0, 0.0, 2.0),
+            rotation: DQuat::from_rotation_x(angle),
+            scale,
+        };
+        let tree = |locals: [Local; 2]| Tree {
+            locals: locals.to_vec(),
+            parents: vec![None, Some(0)],
+            order: vec![0, 1],
+            shown: vec![0, 1],
+        };
+        let view = |parent: DVec3, own: DVec3| {
+            let tree = tree([steps(parent, 0.25), steps(own, 0.5)]);
+            (tree.views(&tree.locals)[1], tree.worlds(&tree.locals)[1])
+        };
+        let (plain, world) = view(DVec3::ONE, DVec3::ONE);
+        assert!(plain.abs_diff_eq(world, 1e-12), "without scales it is the node's own");
+        for flat in [dvec3(-1.0, 1.0, 1.0), dvec3(1.0, -1.0, 1.0), dvec3(1.0, 1.0, 0.0), DVec3::ZERO, -DVec3::ONE] {
+            for (parent, own) in [(flat, DVec3::ONE), (DVec3::ONE, flat)] {
+                let (view, world) = view(parent, own);
+                assert!(view.matrix3.abs_diff_eq(plain.matrix3, 1e-12), "{parent} {own}");
+                assert_eq!(view.translation, world.translation);
+            }
+        }
     }
 }
