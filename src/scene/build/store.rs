@@ -162,7 +162,7 @@ struct Addition<'a, 'l> {
     first: u32,
     /// Whether some texture reads second coordinates, and whether some material needs tangents.
     second: bool,
-    /// Whether colours of vertices count: those of an OBJ file where its table gives it no material.
+    /// Whether colours of vertices count: those of an OBJ file where neither its table nor all of its instances give it another material.
     colors: bool,
     tangents: bool,
     /// What splits lamps, and how often they may be quartered.
@@ -184,7 +184,10 @@ impl<'a, 'l> Addition<'a, 'l> {
         let place = format!("mesh \"{}\"", mesh_name(table));
         let material = override_of(sources, job)?;
         let is_obj = table.file.as_deref().is_some_and(|file| Format::of(file) == Format::Obj);
-        let colors = !(is_obj && material.is_some());
+        let mut instances =
+            sources.description.instance.iter().filter(|i| table.name.as_ref() == Some(&i.mesh)).peekable();
+        let all_worn = instances.peek().is_some() && instances.all(|i| i.material.is_some());
+        let colors = !(is_obj && (material.is_some() || all_worn));
         Ok(Self { job: *job, table, place, material, placement, first, second, colors, tangents, lamps })
     }
 

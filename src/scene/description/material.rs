@@ -63,7 +63,7 @@ pub struct MaterialTable {
     #[serde(rename = "type")]
     pub kind: Type,
     /// Albedo, or the tint of a mirror or conductor; default 0.5 (diffuse, coated without texture), else 1. The vertex colours of a
-    /// mesh multiply it.
+    /// mesh multiply it, but for those of an OBJ file, which are shown where it wears nothing.
     pub color: Option<Rgb>,
     /// sRGB picture that multiplies `color`.
     pub color_texture: Option<TextureTable>,

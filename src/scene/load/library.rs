@@ -45,11 +45,6 @@ impl Library {
         *self.grey.get_or_insert_with(|| materials.push("(default)", Materials::plain([0.6; 3])))
     }
 
-    /// Whether a part wears that grey.
-    pub fn is_grey(&self, part: &Part) -> bool {
-        self.grey == Some(part.material)
-    }
-
     /// Index of the white that the colours of vertices are seen in.
     pub fn white(&mut self) -> u32 {
         let materials = &mut self.materials;
@@ -64,7 +59,9 @@ impl Library {
         if !part.mesh.colors.is_empty() {
             let colors = &mut part.mesh.to_mut().colors;
             colors.iter_mut().filter(|color| **color == NO_VERTEX_COLOR).for_each(|color| *color = [1.0; 4]);
-            colors.truncate(if counts { colors.len() } else { 0 });
+            if !counts {
+                *colors = Vec::new();
+            }
         }
         if part.material == NONE {
             part.material = if counts { self.white() } else { self.grey() };

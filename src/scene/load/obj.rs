@@ -99,8 +99,9 @@ struct Parser<'a> {
     corners: Vec<Corner>,
     /// Materials by name: the scene file's own, and those of the libraries read so far.
     names: HashMap<String, u32>,
-    /// Material names after `usemtl`.
+    /// Names of materials that are not there and that faces ask for, and the one that the next face would.
     unknown: BTreeSet<String>,
+    wanted: Option<String>,
     /// `mtllib` statements, and the true paths of what they name: each is read once.
     statements: HashSet<String>,
     libraries: HashSet<PathBuf>,
@@ -131,6 +132,7 @@ impl<'a> Parser<'a> {
             part: PartBuilder::default(),
             corners: Vec::new(),
             unknown: BTreeSet::new(),
+            wanted: None,
             statements: HashSet::new(),
             libraries: HashSet::new(),
             missing: BTreeSet::new(),
@@ -212,6 +214,7 @@ impl<'a> Parser<'a> {
             self.short_faces = (count + 1, if count == 0 { line } else { first });
             return Ok(());
         }
+        self.unknown.extend(self.wanted.take());
         let has = [1, 2].map(|extra| self.corners.iter().all(|corner| corner[extra] != NO_EXTRA));
         if self.part.differs(has) {
             self.end_part();
@@ -225,9 +228,7 @@ impl<'a> Parser<'a> {
 
     fn wear(&mut self, name: String) {
         let material = self.names.get(&name).copied().unwrap_or(NONE);
-        if material == NONE {
-            self.unknown.insert(name);
-        }
+        self.wanted = (material == NONE).then_some(name);
         if self.part.material != material {
             self.end_part();
             self.part.material = material;
@@ -282,8 +283,11 @@ impl<'a> Parser<'a> {
         for part in &mut self.parts {
             self.library.color(part, self.has_others);
         }
-        let is_grey = self.parts.iter().any(|part| self.library.is_grey(part));
-        ObjFile { grey: self.grey().filter(|_| is_grey), parts: self.parts }
+        if self.has_others {
+            let what = "numbers behind positions are not read: as colours, all must be from 0 to 1";
+            self.library.warnings.push(format!("{}: {what}", self.path.display()));
+        }
+        ObjFile { grey: self.grey(), parts: self.parts }
     }
 
     /// The warning about material names that are used but not defined.
@@ -295,7 +299,9 @@ impl<'a> Parser<'a> {
         };
         let late = unknown.iter().any(|name| self.names.contains_key(*name));
         let nowhere = if late { "defined nowhere, or only below their use" } else { "defined nowhere" };
-        let what = || format!("grey is used for materials {nowhere}: {}{libraries}", few(&unknown));
+        let has_colors = self.parts.iter().any(|part| !part.mesh.colors.is_empty());
+        let stand_in = if has_colors { "grey, or what colours of vertices show," } else { "grey" };
+        let what = || format!("{stand_in} is used for materials {nowhere}: {}{libraries}", few(&unknown));
         (!unknown.is_empty()).then(|| format!("{}: {}", self.path.display(), what()))
     }
 }

@@ -96,8 +96,9 @@ impl ObjBlock {
     /// mean nothing here.
     fn vertex(&mut self, rest: &str) -> Checked {
         let what = "a vertex needs three numbers after v";
+        let rest = rest.split('#').next().unwrap_or_default();
         let mut position = numbers(rest, what)?;
-        let mut more = rest.split_ascii_whitespace().skip(3).take_while(|word| !word.starts_with('#'));
+        let mut more = rest.split_ascii_whitespace().skip(3);
         match (more.next(), more.next(), more.next(), more.nth(1)) {
             (Some(w), None, ..) => {
                 let [w]: [f32; 1] = numbers(w, what)?;
