@@ -59,7 +59,7 @@ impl Allocate {
                 "noise-threshold needs a policy that learns, variance or both: not {name}"
             )));
         }
-        if *max_spp > 0 && min_spp > max_spp {
+        if *max_spp > 0 && min_spp > max_spp && !self.is_even() {
             return Err(Error::Usage(format!("min-spp is {min_spp}: it must not exceed max-spp, {max_spp}")));
         }
         Ok(())

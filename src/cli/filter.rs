@@ -41,7 +41,7 @@ pub enum Light {
 /// sky that are seen, and the sharp shadows of point, spot and directional lights.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Image to filter (EXR; PNG, JPEG and HDR hold no layers)
+    /// Image to filter (EXR; PNG, JPEG, HDR, TGA and BMP hold no layers)
     pub image: PathBuf,
     /// Filter to apply
     #[arg(long, default_value = "auto")]
@@ -277,6 +277,12 @@ fn demodulation(args: &Args) -> Option<Demodulation> {
 
 fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime>, Vec<String>)> {
     let layers = file::Layers::new(aovs);
+    let whole = args.no_demodulate || args.light == Some(Light::All);
+    if whole && layers.holds().indirect_stride > 1 {
+        let option = if args.no_demodulate { "--no-demodulate" } else { "--light all" };
+        let what = "what is filtered is light that not every pixel has (indirect_stride)";
+        return Err(Error::Usage(format!("leave out {option}: {what}")));
+    }
     let recipe = Recipe {
         method: args.filter,
         demodulation: demodulation(args),

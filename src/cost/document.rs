@@ -12,7 +12,7 @@ pub const SCHEMA: u32 = 1;
 pub struct Document {
     /// [`SCHEMA`] of the program that wrote it.
     pub schema: u32,
-    /// Whether every planned run was made or has failed. The same command completes what is not complete.
+    /// Whether every planned run was made or has failed, and every picture was made. The same command completes what is not complete.
     pub complete: bool,
     /// The program that measured.
     pub software: Software,

@@ -149,6 +149,9 @@ impl<'a> Aovs<'a> {
             .find(given.filter(|name| !is_noisy(name)))
             .ok_or_else(|| film.picture(given).err().unwrap_or_default())?;
         let view = split(split(&shown[0].name).0).0;
+        // Parts of the light are no parts of another layer.
+        let is_light =
+            given.is_none_or(is_noisy) || film.find(None).is_some_and(|colour| colour[0].name == shown[0].name);
         let told = names.get(&Aov::Samples).and_then(|told| number(told));
         let mut found = Self {
             film,
@@ -166,7 +169,7 @@ impl<'a> Aovs<'a> {
             }
             let channels = match names.get(&known.aov) {
                 Some(name) => Some(film.find(Some(name)).ok_or_else(|| absent(film, known, name))?),
-                None if known.is_tallow_s_own() && !is_tallow_s(film) => None,
+                None if known.is_tallow_s_own() && !(is_light && is_tallow_s(film)) => None,
                 None => known.names.iter().find_map(|name| find(film, view, name).filter(|c| known.fits(c))),
             };
             let channels = channels.or_else(|| (known.aov == Aov::Colour).then_some(shown));

@@ -148,7 +148,8 @@ pub(crate) fn metadata(renderer: &Renderer, film: &Film) -> Result<BTreeMap<Stri
     let counts = film::counts(film, "samples").map_err(Error::Usage)?;
     let count = counts.iter().copied().max().unwrap_or(0);
     let range = SampleRange { seed: settings.seed, first: settings.first_sample, count };
-    let entries = [(SETTINGS, json(settings)?), (SCENE, scene.to_string()), (SAMPLES, json(&[range])?)];
+    let ranges = if count > 0 { vec![range] } else { Vec::new() };
+    let entries = [(SETTINGS, json(settings)?), (SCENE, scene.to_string()), (SAMPLES, json(&ranges)?)];
     Ok(entries.map(|(key, value)| (key.to_owned(), value)).into())
 }
 

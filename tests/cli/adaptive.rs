@@ -272,6 +272,7 @@ fn what_cannot_be_done_is_one_line() {
     complains(&fails("--allocate both --window 11"), 2, &["window", "2 to 10"]);
     complains(&fails("--allocate both --min-spp 5 --max-spp 4"), 2, &["min-spp", "max-spp"]);
     complains(&fails("--min-spp 1 --max-spp 1"), 2, &["max-spp is 1", "uniform", "spp, 2"]);
+    complains(&fails("--max-spp 1"), 2, &["max-spp is 1", "uniform", "spp, 2"]);
     complains(&fails("--noise-threshold 0.1 --allocate uniform"), 2, &["noise-threshold", "variance or both"]);
     complains(&fails("--resume none.exr"), 3, &["none.exr"]);
     assert!(fails("").status.success());

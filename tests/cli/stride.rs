@@ -36,6 +36,29 @@ fn a_sparse_render_is_filled_in_at_once_or_from_its_file() {
     assert_eq!(colour("more.exr").pixels, colour("whole.exr").pixels);
 }
 
+/// Layers beside the colour are whole; what is filtered of it is its indirect light.
+#[test]
+fn a_sparse_file_has_whole_layers() {
+    let folder = TempDir::new().unwrap();
+    let run = |words: &[&str]| tallow(&folder, words);
+    let render = [&["render", SCENE, "--quiet", "--spp", "4", "-o", "noisy.exr"], &STRIDE[..]].concat();
+    assert!(run(&render).status.success());
+    let layer =
+        |name: &str, layer: &str| image::read(&folder.path().join(name)).unwrap().picture(Some(layer)).unwrap().pixels;
+    for name in ["albedo", "direct"] {
+        assert!(run(&["filter", "noisy.exr", "--colour", name, "--filter", "none", "-o", "same.exr"]).status.success());
+        assert!(layer("same.exr", name) == layer("noisy.exr", name), "{name}");
+    }
+    assert!(
+        run(&["filter", "noisy.exr", "--colour", "direct", "--filter", "atrous", "-o", "other.exr"]).status.success()
+    );
+    assert!(layer("other.exr", "direct") != layer("noisy.exr", "direct"), "it is filtered itself");
+    for option in [&["--no-demodulate"][..], &["--light", "all"]] {
+        let words = [&["filter", "noisy.exr", "--filter", "atrous", "-o", "no.exr"], option].concat();
+        complains(&run(&words), 2, &["leave out", option[0], "indirect_stride"]);
+    }
+}
+
 #[test]
 fn what_cannot_be_sparse_is_one_line() {
     let folder = TempDir::new().unwrap();

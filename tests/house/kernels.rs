@@ -40,9 +40,12 @@ fn broken_in(text: &str, rule: &impl Fn(&str, bool) -> bool) -> Vec<String> {
     found
 }
 
-/// Whether a statement, or the block behind it, runs in some lanes alone.
+/// Whether a statement, or the block behind it, runs in some lanes alone. Loops that count in their heads, and what comes behind a
+/// statement that some lanes leave by, are not looked at.
 fn is_conditional(statement: &str) -> bool {
-    let conditions = statement.match_indices("if (").map(|(at, _)| &statement[at + 4..]);
+    let behind =
+        |word: &str| statement.match_indices(word).map(|(at, _)| &statement[at + word.len()..]).collect::<Vec<_>>();
+    let conditions = [behind("if ("), behind("while (")].concat();
     statement.starts_with("else") || conditions.into_iter().any(|text| !is_constant(inside(text)))
 }
 
@@ -60,7 +63,8 @@ fn inside(text: &str) -> &str {
 fn is_constant(condition: &str) -> bool {
     let words = condition.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
     let mut names = words.filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic()));
-    condition.contains("any_lane(") || names.all(|name| !name.contains(|c: char| c.is_ascii_lowercase()))
+    (condition.trim().starts_with("any_lane(") && !condition.contains("&&"))
+        || names.all(|name| !name.contains(|c: char| c.is_ascii_lowercase()))
 }
 
 /// Whether a function of this name is called.
@@ -78,7 +82,10 @@ fn asks_for_a_sine(statement: &str, _: bool) -> bool {
 fn reads_lanes_apart(statement: &str, apart: bool) -> bool {
     statement.match_indices("from_lane(").any(|(at, _)| {
         let before = &statement[..at];
-        let condition = |text: &str| text.rsplit(['=', '(', ',', ':']).next().unwrap_or_default().to_owned();
+        let condition = |text: &str| {
+            let compared = ["==", "<=", ">=", "!="].iter().fold(text.to_owned(), |text, sign| text.replace(sign, "<"));
+            compared.rsplit(['=', '(', ',', ':']).next().unwrap_or_default().to_owned()
+        };
         let asked = before.rfind('?').is_some_and(|mark| !is_constant(&condition(&before[..mark])));
         apart || asked || is_conditional(before) || before.contains("&&") || before.contains("||")
     })
@@ -101,7 +108,10 @@ fn lanes_are_read_where_all_are() {
     for apart in [
         "uint bit = dealt ? from_lane(bits, owner) : 0u;",
         "bool met = hit && index != from_lane(from.x, owner);",
+        "uint b = lane == LAST_LANE ? from_lane(x, 0u) : 0u;",
         "if (dealt) bit = from_lane(bits, owner);",
+        "while (k < n) { bit = from_lane(bits, owner); }",
+        "if (any_lane(met) && dealt) bit = from_lane(bits, owner);",
         "void f() { if (dealt) { int i = 1; bit = from_lane(bits, owner); } }",
         "if (LANES > 4u) { } else { bit = from_lane(bits, owner); }",
     ] {

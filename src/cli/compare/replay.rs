@@ -24,6 +24,10 @@ pub fn commands(film: &Film, [x, y]: [u32; 2], stem: &str) -> Result<Vec<String>
     let Provenance { settings, samples: ranges, .. } = Provenance::of(film)?;
     let taken =
         film.channel(report::SAMPLES).map(|counts| counts.at(y as usize * film.width as usize + x as usize) as u32);
+    let all: u32 = ranges.iter().map(|range| range.count).sum();
+    if ranges.len() > 1 && taken.is_some_and(|taken| taken != all) {
+        return Err("it is of several renders, and nothing tells which of their samples this pixel has".to_owned());
+    }
     let command = |(i, range): (usize, &SampleRange)| {
         let alone = ranges.len() == 1;
         let part = if alone { String::new() } else { format!("-{i}") };
@@ -86,6 +90,8 @@ mod tests {
         film.metadata.remove("frame");
         ranges(&mut film, r#"[{"seed":5,"first":7,"count":4},{"seed":6,"first":0,"count":5}]"#);
         let two = commands(&film, [2, 1], "a").unwrap();
+        ranges(&mut film, r#"[{"seed":5,"first":7,"count":4},{"seed":6,"first":0,"count":50}]"#);
+        assert!(commands(&film, [2, 1], "a").unwrap_err().contains("nothing tells which"), "of placed samples");
         assert!(two.len() == 2 && two[1].contains("--seed 6 --first-sample 0 --spp 5 ") && two[1].ends_with("-1.exr"));
     }
 }

@@ -89,7 +89,7 @@ pub struct Args {
     /// Runs of each point, each with another seed
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(2..=1000))]
     pub repeats: u32,
-    /// Limit of the whole measurement in minutes; 0 is none
+    /// Limit of reference and runs in minutes; 0 is none. Missing pictures of a measurement that is taken up again are made after it
     // A million minutes are two years.
     #[arg(long, value_name = "MINUTES", default_value = "10",
         value_parser = within(0.0..=1e6, "a number of minutes, or 0 for no limit"))]

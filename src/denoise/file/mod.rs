@@ -41,7 +41,7 @@ impl<'a> Layers<'a> {
             aovs,
             places: Places::new(aovs, &mut notes),
             reflects: false,
-            indirect_m2: film.floats(INDIRECT_M2),
+            indirect_m2: film.floats(INDIRECT_M2).filter(|_| aovs.get(Aov::Indirect).is_some()),
             blur: film.floats(BLUR),
             notes,
         };
@@ -65,7 +65,8 @@ impl<'a> Layers<'a> {
     }
 
     fn indirect_stride(&self) -> u32 {
-        self.aovs.film.metadata.get(INDIRECT_STRIDE).and_then(|n| n.parse().ok()).unwrap_or(1).max(1)
+        let said = self.aovs.film.metadata.get(INDIRECT_STRIDE).filter(|_| self.aovs.get(Aov::Indirect).is_some());
+        said.and_then(|n| n.parse().ok()).unwrap_or(1).max(1)
     }
 
     /// The colour as it is, a plane a channel; a pixel of it that is no number becomes 0.

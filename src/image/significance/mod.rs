@@ -63,8 +63,8 @@ pub const MIN_PIXELS: usize = 16;
 pub struct Options {
     /// Probability that renders with the same expectation are called different, above 0 and at most 0.3.
     pub false_alarms: f64,
-    /// Differences that do not matter, relative to the mean of the region or, if that is darker, of the image. At least
-    /// [`Options::ROUNDING`].
+    /// Differences that do not matter, relative to the mean of the region or, if that is darker, of the image: 0 or more. Below
+    /// [`Options::ROUNDING`], the last bits of drivers may count.
     pub accept: f64,
     /// Relative difference, beyond the accepted one, that must be visible, or else the images are too noisy to be called the
     /// same.

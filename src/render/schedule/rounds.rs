@@ -18,9 +18,10 @@ pub fn steps_of_pixel(settings: &Settings, cut: &Cut, pixel: u32) -> impl Iterat
     once(Step::Start).chain(batches.map(move |batch| Step::Uniform(Batch { first_pixel: pixel, ..batch })))
 }
 
-/// Samples that every pixel gets before any is placed.
+/// Samples that every pixel gets before any is placed. With a noise threshold, `max_spp` limits them where it is given, not `spp`.
 pub fn first_spp(settings: &Settings) -> u32 {
-    if settings.allocate.is_even() { settings.spp } else { settings.allocate.min_spp.min(settings.spp) }
+    let most = if settings.allocate.noise_threshold > 0.0 { limit(settings) } else { settings.spp };
+    if settings.allocate.is_even() { settings.spp } else { settings.allocate.min_spp.min(most) }
 }
 
 /// Largest number of samples of a pixel; where samples are chosen, of those that a threshold decides.
@@ -156,6 +157,16 @@ mod tests {
             steps.iter().any(|s| matches!(s, Step::Listed(range) if range.round > 0))
         };
         assert!(!dealt(0) && dealt(2), "few samples that do not learn are dealt to rounds only when asked for");
+    }
+
+    #[test]
+    fn the_least_number_of_samples_is_a_part_of_the_budget_where_there_is_one() {
+        let first = |threshold: f32| {
+            let mut settings = settings("variance", 64, 128, 4096, 0);
+            settings.allocate.noise_threshold = threshold;
+            first_spp(&settings)
+        };
+        assert_eq!([first(0.0), first(0.1)], [64, 128]);
     }
 
     /// Whenever it stops, be it the first time or once it has gone on. A round of all samples would end at the last pixel.

@@ -129,7 +129,9 @@ pub fn list(scene: &mut Scene) -> Result<()> {
 fn in_whole_words(scene: &mut Scene) {
     const WORDS: f32 = 4294967296.0;
     let outside: Vec<bool> = scene.lights.iter().map(|light| !is_in_tree(scene, light)).collect();
-    for (light, _) in scene.lights.iter_mut().zip(outside).filter(|(_, outside)| *outside) {
+    for (light, _) in
+        scene.lights.iter_mut().zip(outside).filter(|(light, outside)| *outside && light.probability > 0.0)
+    {
         light.probability = (light.probability * WORDS).round().max(1.0) / WORDS;
     }
 }
