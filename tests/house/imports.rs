@@ -1,8 +1,9 @@
 //! Tests the order of the modules: which ones import which, without circles, and which ones may contain Vulkan, `unsafe` and code
 //! that only a program needs.
+use crate::files_below;
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Words that only one module may hold: those of Vulkan, and of what an engine does without (the feature `cli`).
 const ROOMS: &[(&str, &[&str])] = &[("gpu", &["unsafe", "vk", "ash"]), ("cli", &["clap", "signal_hook", "indicatif"])];
@@ -233,16 +234,10 @@ fn circle_through(start: &String, next: &BTreeMap<String, BTreeSet<String>>) -> 
     None
 }
 
-fn sources(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|p| p.is_dir());
-    let below = folders.iter().flat_map(|f| sources(f));
-    files.into_iter().filter(|f| f.extension().is_some_and(|e| e == "rs")).chain(below).collect()
-}
-
 fn house() -> House {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let files = sources(&root);
+    let files: Vec<_> =
+        files_below(&root).into_iter().filter(|file| file.extension().is_some_and(|e| e == "rs")).collect();
     assert!(files.len() > 80, "the sources were not found");
     let inside = |file: &Path| file.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
     House::new(files.iter().map(|file| (inside(file), std::fs::read_to_string(file).unwrap())))

@@ -1,17 +1,12 @@
 //! Rules of the kernels' source that the driver of the tests does not enforce.
+use crate::files_below;
 use std::path::{Path, PathBuf};
-
-fn sources(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|p| p.is_dir());
-    files.into_iter().chain(folders.iter().flat_map(|f| sources(f))).collect()
-}
 
 /// Every statement of the kernels that breaks a rule, with its file. A rule is told whether the statement is in a block behind a
 /// condition that is no constant.
 fn broken(rule: impl Fn(&str, bool) -> bool) -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl");
-    let files = sources(&root);
+    let files = files_below(&root);
     assert!(files.len() > 100, "the kernels were not found");
     let of_file = |file: &PathBuf| {
         let found = broken_in(&std::fs::read_to_string(file).unwrap(), &rule);

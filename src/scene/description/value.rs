@@ -106,7 +106,7 @@ impl Transform {
         Self(DAffine3::from_scale_rotation_translation(scale, rotation, translation), Some((scale, rotation)))
     }
 
-    /// The same elsewhere.
+    /// The same scale and rotation at another place.
     pub fn moved_to(self, translation: DVec3) -> Self {
         Self(DAffine3 { translation, ..self.0 }, self.1)
     }

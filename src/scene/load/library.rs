@@ -52,9 +52,10 @@ impl Library {
     }
 
     /// Gives a part of an OBJ file that wears nothing a material: white, if its vertices have colours, else grey. Colours count there
-    /// alone, since exporters write them beside a material that shows the same. `none` says that the file has others in their place.
-    pub fn color(&mut self, part: &mut Part, none: bool) {
-        let has_colors = !none && part.mesh.colors.iter().any(|color| *color != NO_VERTEX_COLOR);
+    /// alone, since exporters write them beside a material that shows the same. `has_others` says that the file has numbers in their place that are
+    /// no colours.
+    pub fn color(&mut self, part: &mut Part, has_others: bool) {
+        let has_colors = !has_others && part.mesh.colors.iter().any(|color| *color != NO_VERTEX_COLOR);
         let counts = part.material == NONE && has_colors;
         if !part.mesh.colors.is_empty() {
             let colors = &mut part.mesh.to_mut().colors;
