@@ -220,7 +220,7 @@ fn frames_of_any_length_are_timed_and_reused() {
 
 #[test]
 fn a_missing_barrier_is_reported() {
-    let gpu = support::gpu();
+    let gpu = support::own_gpu();
     let mut frame = FrameResources::new(&gpu).unwrap();
     chain(&gpu, &mut frame, 64, true);
     assert_silent(&gpu);

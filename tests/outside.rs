@@ -169,7 +169,7 @@ fn a_skinned_fox_runs_as_another_program_has_it() {
         let ours = pose.meshes[0].1.positions.iter().map(|p| Vec3::from(*p));
         let nearest = |p: Vec3| theirs.iter().map(|q| p.distance(*q)).fold(f32::INFINITY, f32::min);
         assert_eq!((theirs.len(), pose.meshes.len()), (290, 1));
-        ours.map(nearest).fold(0.0, f32::max)
+        ours.map(nearest).fold(0.0, |most, d| if d < f32::INFINITY { d.max(most) } else { f32::INFINITY })
     };
     let time = |frame: u32| f64::from(frame) / 16.0 * fox.animation.end();
     for frame in 0..16 {

@@ -1,23 +1,12 @@
-//! Tests placed samples from the command line: interrupting, resuming, merging, thresholds, and their error messages.
-use crate::child::spp_of_steps;
+//! Tests placed samples from the command line: resuming, merging, thresholds, and their error messages.
+use crate::command::{complains, film, names, scene, tallow};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Output;
 use tallow::image::{self, Film, Samples};
 use tempfile::TempDir;
 
-fn scene() -> String {
-    format!("{}/scenes/cornell-box/scene.toml", env!("CARGO_MANIFEST_DIR"))
-}
-
-fn command(folder: &TempDir, words: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
-    command.current_dir(folder.path()).args(words.split_whitespace());
-    command
-}
-
 fn run(folder: &TempDir, words: &str) -> Output {
-    command(folder, words).output().unwrap()
+    tallow(folder, &words.split_whitespace().collect::<Vec<_>>())
 }
 
 #[track_caller]
@@ -26,17 +15,6 @@ fn render(folder: &TempDir, words: &str) -> String {
     let output = run(folder, &format!("render {} {small} {words}", scene()));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
-}
-
-fn film(folder: &TempDir, name: &str) -> Film {
-    image::read(&folder.path().join(name)).unwrap()
-}
-
-fn names(folder: &TempDir) -> Vec<String> {
-    let entry = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
-    let mut names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(entry).collect();
-    names.sort();
-    names
 }
 
 fn same(a: &Film, b: &Film, layers: &[&str]) -> bool {
@@ -91,45 +69,6 @@ fn resuming_with_more_samples_is_one_render() {
     let (whole, resumed) = (film(&folder, "whole.exr"), film(&folder, "resumed.exr"));
     assert!(same(&whole, &resumed, &LAYERS));
     assert!(!same(&whole, &film(&folder, "part.exr"), &[""]), "the comparison cannot fail");
-}
-
-/// Starts a render, interrupts it, and resumes it.
-fn interrupted(words: &str, spp: u64) {
-    let folder = tempfile::tempdir().unwrap();
-    let words = format!("--width 96 --height 80 --max-depth 4 --spp {spp} --quiet {words}");
-    let mut child = command(&folder, &format!("render {} {words} --checkpoint 0.000001 -o part.exr", scene()))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    // Past compilation.
-    while !folder.path().join("part.partial.exr").exists() {
-        assert!(
-            child.try_wait().unwrap().is_none(),
-            "the render was over before it could be interrupted: raise its spp"
-        );
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    // Of the shell: a bare system has no program of that name.
-    assert!(Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap().success());
-    let begun = Instant::now();
-    let status = child.wait().unwrap();
-    assert_eq!(status.code(), Some(130), "after {:?}", begun.elapsed());
-    let part = film(&folder, "part.exr");
-    let taken: u64 = counts(&part).iter().map(|&n| u64::from(n)).sum();
-    assert!(taken < spp * 96 * 80 && part.channel("pending").is_some(), "{taken} samples");
-    for end in [" --resume part.exr -o resumed.exr", " -o whole.exr"] {
-        assert!(run(&folder, &format!("render {} {words}{end}", scene())).status.success());
-    }
-    assert!(same(&film(&folder, "whole.exr"), &film(&folder, "resumed.exr"), &LAYERS));
-    assert!(film(&folder, "resumed.exr").channel("pending").is_none());
-}
-
-#[test]
-fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
-    // Half as many again: two more steps begin after the one in which the signal should come.
-    interrupted("", spp_of_steps(96 * 80) * 3 / 2);
-    interrupted("--allocate variance --rounds 20", 100);
 }
 
 #[test]
@@ -255,14 +194,6 @@ fn samples_are_added_to_those_of_the_same_scene_only() {
     assert!(!folder.path().join("not.exr").exists());
 }
 
-#[track_caller]
-fn complains(output: &Output, code: i32, parts: &[&str]) {
-    let text = String::from_utf8(output.stderr.clone()).unwrap();
-    assert_eq!(output.status.code(), Some(code), "{text}");
-    assert_eq!(text.lines().count(), 1, "{text}");
-    assert!(parts.iter().all(|p| text.contains(p)), "{text}");
-}
-
 #[test]
 fn what_cannot_be_done_is_one_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -283,5 +214,5 @@ fn what_cannot_be_done_is_one_line() {
     bare.add_vec3("", ["R", "G", "B"], &[[0.0; 3]; 64]);
     image::write(&folder.path().join("bare.exr"), &bare, &Default::default()).unwrap();
     complains(&fails("--resume bare.exr"), 3, &["bare.exr", "settings"]);
-    assert_eq!(names(&folder), ["bare.exr", "x.exr"]);
+    assert_eq!(names(folder.path()), ["bare.exr", "x.exr"]);
 }

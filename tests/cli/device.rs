@@ -1,7 +1,7 @@
 //! Tests the built program's messages without a Vulkan loader, driver or device, and when it loses its device while it renders.
 #![cfg(target_os = "linux")]
-use crate::child::{command, scene};
-use crate::command::{complains, stdout};
+use crate::child::command;
+use crate::command::{complains, scene, stdout};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::LazyLock;

@@ -1,31 +1,20 @@
 //! Tests signals to the built program: which ones it obeys or ignores, and what it saves.
 #![cfg(target_os = "linux")]
-use crate::child::{LONG, OFTEN, Running, SMALL, command, scene, spp_of_steps};
-use crate::command::complains;
+use crate::child::{LONG, OFTEN, Running, SMALL, command, spp_of_steps};
+use crate::command::{complains, film, names, scene};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Output};
-use tallow::image::{self, Film, Samples, WriteOptions};
+use tallow::image::{self, Samples, WriteOptions};
 use tempfile::TempDir;
 
 fn start(folder: &TempDir, words: &str) -> Running {
     Running::start(command(folder.path(), words), folder.path())
 }
 
-fn film(folder: &TempDir, name: &str) -> Film {
-    image::read(&folder.path().join(name)).unwrap()
-}
-
-/// Memory without a disk, where files need no name on every system; the names that are in it.
+/// Memory without a disk, where files need no name on every system.
 fn in_memory() -> TempDir {
     tempfile::tempdir_in("/dev/shm").unwrap()
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entry = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
-    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(entry).collect();
-    names.sort();
-    names
 }
 
 fn mkfifo(folder: &TempDir, name: &str) {
@@ -114,7 +103,7 @@ fn a_pipe_gets_the_image_once() {
     let words = format!("render {} {SMALL} --spp 2 -o pipe.exr -o a.exr --denoise atrous", scene());
     let mut running = start(&folder, &words);
     running.until_there_is("a.exr");
-    let read = std::fs::read(folder.path().join("pipe.exr")).unwrap();
+    let read = running.out_of("pipe.exr", std::fs::read);
     let output = running.end();
     assert!(output.status.success(), "{output:?}");
     let (read, saved) = (image::decode(&read).unwrap(), film(&folder, "a.exr"));
@@ -299,24 +288,27 @@ fn nothing_hidden_stays_whatever_ends_it() {
     assert_eq!(std::fs::read(&path).unwrap(), b"halfwhole");
 }
 
-/// Kills a render that writes checkpoints, and resumes it.
-fn killed(words: &str, spp: u64) {
+/// Sends a signal to a render that writes checkpoints, and resumes it from what it leaves.
+fn ended_by(signal: &str, left: &str, words: &str, spp: u64) {
     let folder = tempfile::tempdir().unwrap();
     let words = format!("render {} {SMALL} --spp {spp} {words}", scene());
     let mut running = start(&folder, &format!("{words} {OFTEN} -o a.exr"));
     running.until_there_is("a.partial.exr");
-    running.send(&["KILL"]);
-    assert_eq!(running.end().status.signal(), Some(9), "it was over before it could be killed: raise its spp");
-    assert_eq!(names(folder.path()), ["a.partial.exr"]);
-    let part = film(&folder, "a.partial.exr");
+    running.send(&[signal]);
+    let status = running.end().status;
+    let expected = if signal == "KILL" { (Some(9), None) } else { (None, Some(130)) };
+    assert_eq!((status.signal(), status.code()), expected, "was it over before {signal}? Raise its spp");
+    assert_eq!(names(folder.path()), [left]);
+    let part = film(&folder, left);
     assert!(part.channel("pending").is_some());
     // No checkpoint falls due once it goes on.
-    for end in ["-o whole.exr", "--checkpoint 1000 --resume a.partial.exr -o a.exr"] {
+    for end in ["-o whole.exr", &format!("--checkpoint 1000 --resume {left} -o a.exr")] {
         let output = command(folder.path(), &format!("{words} {end}")).output().unwrap();
         assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     }
     let (whole, resumed) = (film(&folder, "whole.exr"), film(&folder, "a.exr"));
-    for layer in [None, Some("m2"), Some("direct"), Some("indirect"), Some("samples")] {
+    assert!(resumed.channel("pending").is_none());
+    for layer in [None, Some("m2"), Some("variance"), Some("direct"), Some("indirect"), Some("samples")] {
         let [whole, resumed, part] = [&whole, &resumed, &part].map(|film| film.picture(layer).unwrap().pixels);
         assert!(whole == resumed, "{layer:?}");
         assert!(whole != part, "the comparison cannot fail");
@@ -326,8 +318,15 @@ fn killed(words: &str, spp: u64) {
 
 #[test]
 fn a_killed_render_goes_on_from_its_checkpoint() {
-    killed("", spp_of_steps(96 * 80));
-    killed("--allocate variance --rounds 20", 100);
+    ended_by("KILL", "a.partial.exr", "", spp_of_steps(96 * 80));
+    ended_by("KILL", "a.partial.exr", "--allocate variance --rounds 20", 100);
+}
+
+#[test]
+fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
+    // Half as many again: two more steps begin after the one in which the signal should come.
+    ended_by("INT", "a.exr", "", spp_of_steps(96 * 80) * 3 / 2);
+    ended_by("INT", "a.exr", "--allocate variance --rounds 20", 100);
 }
 
 /// Of paths that would all fit one step.

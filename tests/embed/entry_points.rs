@@ -1,6 +1,7 @@
 //! Tests at Vulkan's entry points what the renderer asks of an engine's device.
 #![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
 use crate::hooks;
+use crate::poses::{MOMENTS, Moment, at, pose};
 use crate::support::engine::Engine;
 use ash::vk;
 use ash::vk::Handle;
@@ -14,7 +15,7 @@ use tallow::denoise::{Demodulation, Denoiser};
 use tallow::error::Error;
 use tallow::gpu::{Buffer, FrameResources, Gpu, RawDevice, Recorder};
 use tallow::render::settings::Settings;
-use tallow::render::{Outputs, Renderer, Step};
+use tallow::render::{Moves, Outputs, Renderer, Reproject, Step};
 use tallow::scene::{Loaded, Scene};
 
 /// Counts are asked for, so that every kind of pass takes part.
@@ -62,6 +63,34 @@ fn nothing_is_created_after_the_first_frame() {
     let _resized = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
     let made = hooks::take_calls();
     assert!(made.contains_key("vkCreateBuffer") && !made.contains_key("vkCreateComputePipelines"), "{made:?}");
+}
+
+/// Poses, what they upload, and carried samples: the first two frames make room for what they stage, and the rest use it.
+#[test]
+fn nothing_is_created_while_a_scene_moves() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let mut scene = at(&Moment::default());
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+    renderer.keep_history(Reproject::default(), Moves::Scene).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    assert!(hooks::take_calls().contains_key("vkCreateComputePipelines"), "control");
+    for (number, moment) in MOMENTS.iter().chain(&MOMENTS).enumerate() {
+        let pose = pose(&scene, moment, f32::INFINITY);
+        let change = scene.apply(&pose).unwrap();
+        engine.run(|commands| {
+            // SAFETY: recording, on this device.
+            let mut rec = unsafe { Recorder::external(&gpu, &mut frame, commands.as_raw()) }.unwrap();
+            renderer.update(&mut rec, &scene, &change).unwrap();
+            renderer.steps_on().for_each(|step| renderer.record(&mut rec, &step).unwrap());
+        });
+        assert!(frame.times().is_ok());
+        let mut calls = hooks::take_calls();
+        calls.remove("vkGetQueryPoolResults"); // asks, and makes nothing
+        assert!(number < 2 || calls.is_empty(), "frame {number}: {calls:?}");
+    }
 }
 
 #[test]

@@ -89,7 +89,7 @@ fn a_spot_lights_a_diffuse_floor_by_the_inverse_square() {
     let largest = ALBEDO / PI * INTENSITY / SPOT.y.powi(2);
     let off = |falloff: fn(f64) -> f64| {
         let of_pixel = |(i, s): (usize, &PixelStats)| (f64::from(s.mean[0]) - lit_floor(i, falloff)).abs() / largest;
-        stats.iter().enumerate().map(of_pixel).fold(0.0, f64::max)
+        support::largest_f64(stats.iter().enumerate().map(of_pixel))
     };
     println!("off by at most {:.1e} of the largest", off(linear));
     // Lavapipe's arc cosine brings it to 5e-5.

@@ -220,9 +220,9 @@ fn worst_block(scene: &Loaded, name: &str) -> f64 {
             m += f64::from(mean[i][1]);
             spread += f64::from(ours[i].m2[1] / (n * (n - 1.0)) + error[i][1] * error[i][1]);
         }
-        ((a - m).abs() - 4.0 * spread.sqrt()).max(0.0) / m
+        ((a - m).abs() - 4.0 * spread.sqrt()) / m
     };
-    (0..64).map(block).fold(0.0, f64::max)
+    support::largest_f64((0..64).map(block))
 }
 
 #[test]

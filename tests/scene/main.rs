@@ -1,7 +1,6 @@
 //! Tests scenes from files and from memory: their arrays, and the messages about mistakes.
 mod animation;
 #[path = "../support/command.rs"]
-#[allow(dead_code)]
 mod command;
 mod files;
 mod gltf;

@@ -1,7 +1,8 @@
 //! The built program while it runs, and signals to it.
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::time::Duration;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
 use tallow::gpu::{DeviceOptions, Gpu};
 
 /// Options of a small render.
@@ -19,11 +20,6 @@ pub fn spp_of_steps(pixels: u64) -> u64 {
     (steps * gpu.tuning().paths_in_flight as f64 / pixels as f64) as u64
 }
 
-/// Path of the scene that is rendered.
-pub fn scene() -> String {
-    format!("{}/scenes/cornell-box/scene.toml", env!("CARGO_MANIFEST_DIR"))
-}
-
 /// The program with these words.
 pub fn command(folder: &Path, words: &str) -> Command {
     // A shell starts what runs in its background with INT ignored, and the tests would pass that on.
@@ -32,6 +28,9 @@ pub fn command(folder: &Path, words: &str) -> Command {
     command.current_dir(folder).args(words.split_whitespace());
     command
 }
+
+/// What is waited for comes within this time on any machine, or never.
+const LONGEST: Duration = Duration::from_secs(600);
 
 /// A process, and where it runs.
 pub struct Running {
@@ -49,11 +48,35 @@ impl Running {
     /// Waits until `done` says so.
     #[track_caller]
     pub fn until(&mut self, what: &str, done: impl Fn(&Path) -> bool) {
+        let begun = Instant::now();
         while !done(&self.folder) {
             let ended = self.child.try_wait().unwrap();
             assert!(ended.is_none() || done(&self.folder), "it ended before {what}: {ended:?}");
+            assert!(begun.elapsed() < LONGEST, "after {LONGEST:?} it still runs, and has not come to {what}");
             std::thread::sleep(Duration::from_millis(5));
         }
+    }
+
+    /// What comes out of a pipe that it writes, which blocks until it does; `take` opens the path.
+    #[track_caller]
+    pub fn out_of<T: Send + 'static>(&mut self, pipe: &str, take: fn(PathBuf) -> std::io::Result<T>) -> T {
+        let path = self.folder.join(pipe);
+        let reader = std::thread::spawn(move || take(path));
+        let begun = Instant::now();
+        let mut ended = None;
+        while !reader.is_finished() {
+            if self.child.try_wait().unwrap().is_some() {
+                ended.get_or_insert_with(Instant::now);
+            }
+            // What it wrote last may still be on its way.
+            assert!(
+                ended.is_none_or(|ended: Instant| ended.elapsed() < LONGEST / 60),
+                "it ended and left {pipe} alone"
+            );
+            assert!(begun.elapsed() < LONGEST, "after {LONGEST:?} it still runs, and has not written {pipe}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        reader.join().unwrap().unwrap()
     }
 
     /// Waits until the file exists.
@@ -86,8 +109,22 @@ impl Running {
         assert!(Command::new("sh").args(["-c", &script]).status().unwrap().success());
     }
 
-    /// Waits until the program ends.
+    /// Waits until the program ends. One that does not is killed.
     pub fn end(mut self) -> Output {
+        let (over, wait) = channel::<()>();
+        let kill = format!("kill -KILL {}", self.id());
+        let watch = std::thread::spawn(move || {
+            if wait.recv_timeout(LONGEST) == Err(RecvTimeoutError::Timeout) {
+                let _ = Command::new("sh").args(["-c", &kill]).status();
+            }
+        });
+        let output = self.read_to_end();
+        drop(over);
+        watch.join().unwrap();
+        output
+    }
+
+    fn read_to_end(&mut self) -> Output {
         let mut stderr = Vec::new();
         std::io::Read::read_to_end(self.child.stderr.as_mut().unwrap(), &mut stderr).unwrap();
         Output { status: self.child.wait().unwrap(), stdout: Vec::new(), stderr }

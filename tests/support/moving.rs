@@ -134,7 +134,8 @@ pub fn truth(stats: &[PixelStats], words: &[u32], direct: &[PixelStats]) -> [f64
         let difference = f64::from(s.mean[1]) - f64::from(d.mean[1]);
         // The deviation of the direct render stands for that of the few samples, which may be alike by chance.
         let error = (variance(d) * f64::from(d.count) / f64::from(s.count) + variance(d)).sqrt();
-        wrong += f64::from(u8::from(difference.abs() > 4.0 * error + 1e-3));
+        let right = difference.abs() <= 4.0 * error + 1e-3; // not so of what is no number
+        wrong += f64::from(u8::from(!right));
         (all, off, light) = (all + 1.0, off + difference, light + f64::from(d.mean[1]));
     }
     [wrong / all, off / light]

@@ -1,9 +1,10 @@
 //! Compares the shading functions on the device with their CPU twins: random words exactly, radiometry within tolerances.
 use crate::support::kernels::{bsdf, sampler};
+use crate::support::{assert_silent, gpu};
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
 use std::sync::LazyLock;
 use tallow::error::Result;
-use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
 use tallow::layout::{
     BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, BSDF_METALLIC, Effects, MATERIAL_GGX,
     MATERIAL_NONLINEAR, Material, TestPush,
@@ -77,10 +78,15 @@ fn cases(kinds: &[u32], ggx: &[u32]) -> Vec<Case> {
     (0..CASES).map(case).collect()
 }
 
-/// What `glsl/test/bsdf.comp` writes for one case.
-fn twin((material, [wo, wi, u, coat]): &Case) -> [Vec4; 5] {
+fn bsdf_of((material, [.., coat]): &Case) -> Bsdf {
     let mut b = Bsdf::new(material, material.alpha, tables());
     b.metallic.coat_normal = *coat;
+    b
+}
+
+/// What `glsl/test/bsdf.comp` writes for one case.
+fn twin(case: &Case) -> [Vec4; 5] {
+    let (b, [wo, wi, u, _]) = (bsdf_of(case), &case.1);
     let (sampled, s) = bsdf_sample(&b, *wo, u.x, vec2(u.y, u.z));
     let flag = |on: bool| f32::from(u8::from(on));
     [
@@ -109,17 +115,20 @@ fn on_device(gpu: &Gpu, effects: &Effects, cases: &[Case]) -> Result<Vec<[Vec4; 
 }
 
 /// Agreement of one case: 0.2 %, but for values that rounding at a lobe's flank moves; `sampled` decides whether a
-/// sample holds anything.
-fn agrees(device: &[Vec4; 5], host: &[Vec4; 5]) -> bool {
+/// sample holds anything. What is evaluated at the sampled direction is so at the device's own: lobes may be narrower than their
+/// directions agree.
+fn agrees(device: &[Vec4; 5], case: &Case) -> bool {
+    let host = twin(case);
     let close = |a: Vec4, b: Vec4| (a - b).abs().cmple(Vec4::splat(2e-3 * b.abs().max_element() + 1e-5)).all();
     let absorbed = device[1].w == 0.0 && host[1].w == 0.0;
+    let evaluated = || bsdf_evaluate(&bsdf_of(case), case.1[0], device[1].truncate());
     close(device[0], host[0])
         && close(device[3], host[3])
-        && (absorbed || [1, 2].iter().all(|&i| close(device[i], host[i])))
+        && (absorbed || [1, 2].iter().all(|&i| close(device[i], host[i])) && close(device[4], evaluated()))
 }
 
 fn disagreements(device: &[[Vec4; 5]], cases: &[Case]) -> Vec<usize> {
-    (0..cases.len()).filter(|&i| !agrees(&device[i], &twin(&cases[i]))).collect()
+    (0..cases.len()).filter(|&i| !agrees(&device[i], &cases[i])).collect()
 }
 
 /// A scene with these alone.
@@ -145,7 +154,7 @@ fn only(kinds: &[u32], beckmann: bool, ggx: bool) -> Effects {
 
 #[test]
 fn bsdfs_equal_their_twins() -> Result<()> {
-    let gpu = Gpu::open(&DeviceOptions::default())?;
+    let gpu = gpu();
     let all = [BSDF_DIFFUSE, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_COATED, BSDF_METALLIC];
     let runs: [(&[u32], &[u32]); 6] = [
         (&all, &[0, 1]),
@@ -207,6 +216,7 @@ fn bsdfs_equal_their_twins() -> Result<()> {
             assert!(of(|m| m.flags &= !MATERIAL_NONLINEAR) > CASES / 50, "control");
         }
     }
+    assert_silent(&gpu);
     Ok(())
 }
 
@@ -222,19 +232,21 @@ fn a_conductor_of_index_zero_reflects_all_on_the_device_too() -> Result<()> {
         (material, [wo, vec3(-wo.x, 0.0, z), numbers(i, 0).extend(numbers(i, 1).x), Vec3::Z])
     };
     let cases: Vec<Case> = (0..60).map(case).collect();
-    let found = on_device(&Gpu::open(&DeviceOptions::default())?, &only(&[BSDF_CONDUCTOR], true, false), &cases)?;
+    let gpu = gpu();
+    let found = on_device(&gpu, &only(&[BSDF_CONDUCTOR], true, false), &cases)?;
     let finite = |r: &[Vec4; 5]| r[0].is_finite() && (r[1].w == 0.0 || r[1..].iter().all(|v| v.is_finite()));
     assert!(found.iter().all(finite), "{found:?}");
     assert_eq!(disagreements(&found, &cases), [0; 0]);
     for (r, (m, _)) in found.iter().zip(&cases).filter(|(r, (m, _))| m.alpha == 0.0 && r[1].w == 1.0) {
         assert!((r[2].truncate() - vec3(1.0, 1.0, 0.0)).abs().max_element() < 1e-5, "{m:?} {r:?}");
     }
+    assert_silent(&gpu);
     Ok(())
 }
 
 #[test]
 fn random_words_equal_their_twin() -> Result<()> {
-    let gpu = Gpu::open(&DeviceOptions::default())?;
+    let gpu = gpu();
     let word = |i: u32, pair: u32| sample_2d_bits(sampler_start(i, 0, 1, true), pair);
     let mut queries: Vec<[u32; 3]> = (0..4096).map(|i| [word(i, 0)[0], word(i, 0)[1], word(i, 1)[0]]).collect();
     queries.extend((0..4096).map(|i| [i, i % 64, i % 7]));
@@ -256,5 +268,6 @@ fn random_words_equal_their_twin() -> Result<()> {
         let twin: Vec<[f32; 2]> = queries.iter().map(|q| sample_2d(stream(q, 77), q[2]).to_array()).collect();
         assert_eq!(floats.read()?, twin);
     }
+    assert_silent(&gpu);
     Ok(())
 }

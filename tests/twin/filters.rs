@@ -71,6 +71,34 @@ fn atrous_solves_the_worked_example() {
     assert!((red(&reference(&line(&[0.0, 1.0]), &edge))[0] - w / (w + 6.0 / 16.0)).abs() < 1e-6);
     let kept = red(&reference(&line(&[0.0, 1.0]), &edge.with(|s| s.atrous.conserve_energy = true)));
     assert!((kept[0] - w * 6.0 / 16.0).abs() < 1e-6 && kept[0] + kept[1] == 1.0);
+    // Level 1 looks at half of the sigma, which is four times the exponent. Of 0 | 0 | 1 level 0 makes, with e = e^-3 and the taps 6, 4
+    // and 1: e / (10 + e), 4 e / (10 + 4 e) and 6 / (6 + 5 e).
+    let e = (-3.0f32).exp();
+    let [a, b, c] = [e / (10.0 + e), 4.0 * e / (10.0 + 4.0 * e), 6.0 / (6.0 + 5.0 * e)];
+    let one = red(&reference(&line(&[0.0, 0.0, 1.0]), &edge));
+    assert!([a, b, c].iter().zip(&one).all(|(a, b)| (a - b).abs() < 1e-6), "{one:?}");
+    let two = edge.with(|s| s.footprint.levels = 2);
+    let far = |exponent: f32, from: f32, to: f32| {
+        let w = 4.0 * (-exponent).exp();
+        (6.0 * from + w * to) / (6.0 + w)
+    };
+    let found = red(&reference(&line(&[0.0, 0.0, 1.0]), &two));
+    assert!(
+        (found[0] - far(4.0 * 3.0 * (c - a) * (c - a), a, c)).abs() < 1e-6 && (found[1] - b).abs() < 1e-6,
+        "{found:?}"
+    );
+    // It begins to look at radiance where it is told to: level 0 makes 1/11, 4/14 and 6/11, level 1 looks at its own sigma.
+    let found = red(&reference(&line(&[0.0, 0.0, 1.0]), &two.with(|s| s.atrous.rt_from_level = 1)));
+    let [a, c] = [1.0 / 11.0, 6.0 / 11.0];
+    assert!((found[0] - far(4.0 * 3.0 * (c - a) * (c - a), a, c)).abs() < 1e-6, "{found:?}");
+    // Of normals the listing divides the square of a difference, here 2, by that of the distance.
+    let mut bent = line(&[0.0, 0.0, 1.0]);
+    bent.guide.iter_mut().for_each(|guide| guide.normal = [0.0, 0.0, 1.0]);
+    bent.guide[2].normal = [1.0, 0.0, 0.0];
+    let found = red(&reference(&bent, &two.with(|s| (s.edge.sigma_rt, s.edge.sigma_n) = (off, 1.0))));
+    let e = (-2.0f32).exp();
+    let [a, c] = [e / (10.0 + e), 6.0 / (6.0 + 5.0 * e)];
+    assert!((found[0] - far(2.0 / 4.0, a, c)).abs() < 1e-6, "{found:?}");
     // The root of a pixel's samples weighs too: of 9 beside 1, 4/16 * 3 beside 6/16.
     let mut uneven = line(&[0.0, 1.0]);
     uneven.radiance[1][3] = 9.0;

@@ -1,5 +1,6 @@
 //! Compares the CPU twins of traversal and transport with brute force, exact answers and each other. `kernels.rs` compares the
 //! kernels with the same twins.
+use crate::support::largest;
 use crate::twin::*;
 use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
@@ -602,7 +603,7 @@ fn heights_of_turned_pictures_have_the_slopes_of_turned_coordinates() {
             let barycentric = vec2(0.3, 0.005 * f32::from(i));
             surface_at(scene, &Hit { t: 1.0, triangle: 0, instance: NONE, barycentric }).normal
         };
-        let off = |a: &Loaded, b: &Loaded| (0..100).map(|i| (normal(a, i) - normal(b, i)).length()).fold(0.0, f32::max);
+        let off = |a: &Loaded, b: &Loaded| largest((0..100).map(|i| (normal(a, i) - normal(b, i)).length()));
         assert!(off(&by_map, &by_mesh) < 1e-3, "{width}x{height}: {}", off(&by_map, &by_mesh));
         assert!(off(&by_map, &not) > 0.05, "control, {width}x{height}: {}", off(&by_map, &not));
     }

@@ -322,7 +322,7 @@ fn auto_changes_from_filter_to_filter_without_a_seam() {
     let output = run(&gpu, auto, &input, &FilterSettings::default().scaled_to(&input)).unwrap().0;
     let kept = |x: usize| (0..48).map(|y| sign(x, y) * (output[y * 2 * HALF + x][0] - 1.0)).sum::<f32>() / (0.3 * 48.0);
     assert!(kept(0) > 0.99 && (HALF..2 * HALF).all(|x| kept(x).abs() < 0.1), "the pattern is kept, and noise is not");
-    let steepest = (1..HALF).map(|x| (kept(x) - kept(x - 1)).abs()).fold(0.0, f32::max);
+    let steepest = largest((1..HALF).map(|x| (kept(x) - kept(x - 1)).abs()));
     assert!(steepest < 0.125, "{:.3?}", (0..HALF).map(kept).collect::<Vec<_>>());
     assert_silent(&gpu);
 }
