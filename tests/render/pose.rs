@@ -110,6 +110,40 @@ fn what_is_dark_when_the_renderer_is_made_can_be_switched_on() {
     }
 }
 
+/// Lamps enough for a tree, and no other light: a renderer is made, and a moved one updated, for a moment at which all are dark.
+#[test]
+fn a_moment_at_which_every_lamp_is_dark_is_rendered() {
+    let gpu = gpu();
+    let lamp = |x: i32| {
+        format!(
+            "[[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\ntransform = {{ rotate = [90, 0, 0], translate = [{x}, 3, 0] }}\n"
+        )
+    };
+    let text = format!(
+        "[[material]]\nname = 'lamp'\nemission = 5\n[[mesh]]\nshape = 'cube'\n{}",
+        [-3, 0, 3].map(lamp).concat()
+    );
+    let mut scene =
+        Scene::parse(Path::new("scene.toml"), &text).unwrap().with(|s| (s.width, s.height, s.spp) = (24, 16, 2));
+    let [dark, lit] = [0.0, 5.0].map(|emission| MaterialChange { emission: Some([emission; 3]), ..Default::default() });
+    let mut moved = renderer(&gpu, &scene);
+    let bright = render(&gpu, &moved);
+    assert!(
+        scene.light_nodes.len() > 1 && bright.iter().any(|stats| stats.mean[0] > 0.0),
+        "control: a tree, and light"
+    );
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    for (change, is_dark) in [(dark, true), (lit, false)] {
+        let change = scene.apply(&Pose { materials: vec![(0, change)], ..Pose::default() }).unwrap();
+        gpu.run(&mut frame, |rec| moved.update(rec, &scene, &change)).unwrap();
+        assert_eq!(scene.light_nodes[0].power, if is_dark { 0.0 } else { 1.0 });
+        let found = render(&gpu, &moved);
+        assert!(found == render(&gpu, &renderer(&gpu, &scene)), "one made now; dark: {is_dark}");
+        assert!(if is_dark { found.iter().all(|stats| stats.mean == [0.0; 3]) } else { found == bright });
+    }
+    assert_silent(&gpu);
+}
+
 /// A panel above a cube and a dark sky, neither of which shines yet, and a light without soft shadows.
 const DARK: &str = "[environment]\nradiance = 0\n[[material]]\nname = 'panel'\n[[material]]\nname = 'grey'\n\
     [[mesh]]\nshape = 'rectangle'\nmaterial = 'panel'\ntransform = { rotate = [90, 0, 0], translate = [0, 3, 0] }\n\

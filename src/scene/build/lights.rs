@@ -150,7 +150,11 @@ fn tree(scene: &mut Scene) -> Vec<LightNode> {
             outside.push((index, light.probability));
         }
     }
-    let probability = if outside.is_empty() { 1.0 } else { probability as f32 };
+    let probability = match (lamps.is_empty(), outside.is_empty()) {
+        (true, _) => 0.0, // all are dark, or hidden
+        (false, true) => 1.0,
+        (false, false) => probability as f32,
+    };
     light_tree::build(lamps, probability, &outside)
 }
 
