@@ -15,11 +15,16 @@ layout(scalar, push_constant) uniform Push { LightChangePush push; };
 // it is, with its sign: it stands for little, and noise cancels.
 const uint LEAST_SPACING = 1u;
 
+// What has changed without noise at one path (`change` of the first level) has so in as many cells across around it: few of their paths
+// meet the narrow edge of a shadow that passes there.
+const int CERTAIN_ACROSS = 5;
+
 void main() {
     uint i = thread_index();
     if (i >= push.cells.x * push.cells.y) return;
     ivec2 size = ivec2(push.cells), at = ivec2(i % push.cells.x, i / push.cells.x);
     LightChange all = LightChange_zero();
+    float certain = 0.0;
     for (int k = 0; k < 9; k++) {
         ivec2 q = at + int(push.spacing) * ivec2(k % 3 - 1, k / 3 - 1);
         if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, size))) continue;
@@ -30,9 +35,15 @@ void main() {
         all.light += other.light;
         all.count += other.count;
     }
+    for (int k = 0; k < CERTAIN_ACROSS * CERTAIN_ACROSS && push.spacing == LEAST_SPACING; k++) {
+        ivec2 q = at + ivec2(k % CERTAIN_ACROSS, k / CERTAIN_ACROSS) - CERTAIN_ACROSS / 2;
+        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, size))) continue;
+        certain = max(certain, LightChange_change(found, uint(q.y * size.x + q.x)));
+    }
     vec3 sum = abs(all.sum);
     float together = sqrt(max(all.size * all.size - all.squares, 0.0));
     float change = push.spacing == LEAST_SPACING ? together : largest_channel(sum);
-    all.change = max(LightChange_change(found, i), change > 0.0 ? change / all.light : 0.0);
+    float before = push.spacing == LEAST_SPACING ? certain : LightChange_change(found, i);
+    all.change = max(before, change > 0.0 ? change / all.light : 0.0);
     sums[i] = all;
 }

@@ -89,6 +89,15 @@ LightChange share_of_light(vec3 difference, float light, uint pixel) {
     return change;
 }
 
+// The share of the light around a pixel that has come or gone without noise: where the shadow or the cone of a light without extent has
+// moved across the path's first surface. None where another light was chosen.
+float certain_change(vec3 before, uint choice, uint pixel) {
+    if (certain_choice == NONE || certain_choice != choice) return 0.0;
+    float change = largest_channel(abs(certain_light - before));
+    float most = max(largest_channel(light_around(pixel, push.constants.size)), largest_channel(max(certain_light, before)));
+    return finite(vec3(change)) ? change / max(most, 1e-30) : 0.0;
+}
+
 void main() {
     uint i = thread_index();
     if (i >= push.cells) return;
@@ -105,10 +114,13 @@ void main() {
     vec3 light = light_from(at, sample_of(i));
     if (!after) {
         probes[i].light = light;
+        probes[i].certain = certain_light;
+        probes[i].choice = certain_choice;
         probes[i].pixel = pixel;
         return;
     }
     vec3 difference = light - before.light;
     bool counts = pixel != NONE && finite(difference);
     changes[i] = counts ? share_of_light(difference, largest_channel(max(light, before.light)), known) : LightChange_zero();
+    if (counts) changes[i].change = certain_change(before.certain, before.choice, known);
 }

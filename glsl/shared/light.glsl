@@ -15,7 +15,8 @@ struct LightSample {
     float distance; // to the offset point on the light, world units; huge for lights at infinity
     vec3 radiance;  // already divided by the probability of the sample
     float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
-    bool sharp;     // of a light without extent that nearly every sample chooses: sharp shadows, and little noise
+    float sharp;    // of a light without extent, whose shadows are sharp, the probability that it is chosen; else 0
+    uint chosen;    // index of the light
 };
 
 // What light is sampled for.
@@ -284,8 +285,9 @@ const float EVEN_SHARE = 0.05;
 // Chooses anew among the point and spot lights, one of which the table has chosen: by what each would bring if nothing were in its way
 // (resampling of all candidates: Talbot, Cline and Egbert 2005). The sun would starve lamps in its shade, so that lights at infinity
 // stay apart, as in pbrt-v4. Lights with a surface lie behind the others.
-Light choose_by_share(Receiver r, float u) {
+Light choose_by_share(Receiver r, float u, out uint index) {
     Light chosen = Light_load(lights, 0u);
+    index = 0u;
     float sum = 0.0, number = 0.0, group = 0.0;
     uint end = 0u;
     for (; end < push.constants.light_count; end++) {
@@ -304,6 +306,7 @@ Light choose_by_share(Receiver r, float u) {
         float brings = is_point_or_spot(light.kind) ? unshadowed(light, r) : 0.0;
         if (brings <= 0.0) continue;
         chosen = light; // in the end the last, if rounding leaves something
+        index = i;
         share = mix(brings / sum, 1.0 / number, EVEN_SHARE);
         before += share;
     }
@@ -324,15 +327,14 @@ float lamp_density(uint material, float brightness) {
 // Samples one light for a receiver. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(Receiver r, uint word, vec2 u) {
     vec3 p = r.position;
-    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, false);
+    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, 0.0, 0u);
     uint count = push.constants.light_count, index = 0u, rest = word;
     float probability = 0.0;
     if (FX_LIGHT_TREE) index = choose_light(r, rest, probability);
     else if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, rest);
     Light light = Light_load(lights, index);
     if (FX_LIGHT_TREE && probability > 0.0) light.probability = probability;
-    if (FX_WEIGHED_LIGHTS && is_point_or_spot(light.kind)) light = choose_by_share(r, u.x);
-    bool often = light.probability >= SHARP_PROBABILITY;
+    if (FX_WEIGHED_LIGHTS && is_point_or_spot(light.kind)) light = choose_by_share(r, u.x, index);
     if (FX_EMISSIVE && is_triangle_light(light.kind)) {
         sample_triangle_light(p, light, u, s);
     } else if (FX_EMISSIVE && is_sphere_light(light.kind)) {
@@ -343,13 +345,13 @@ LightSample light_sample(Receiver r, uint word, vec2 u) {
         s.distance = sqrt(d2);
         s.direction = to_light / s.distance;
         s.radiance = light.value / (d2 * light.probability);
-        s.sharp = often;
+        s.sharp = light.probability;
         if (FX_SPOT && light.kind == LIGHT_SPOT) s.radiance *= spot_share(light, s.direction);
     } else if (FX_DIRECTIONAL && light.kind == LIGHT_DIRECTIONAL) {
         s.direction = -light.b;
         s.distance = INFINITE_DISTANCE;
         s.radiance = light.value / light.probability;
-        s.sharp = often;
+        s.sharp = light.probability;
     } else if (FX_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         sample_environment(index, light.probability, rest, u, s);
     }
@@ -357,6 +359,7 @@ LightSample light_sample(Receiver r, uint word, vec2 u) {
         float density = lamp_density(light.material, FX_TEXTURES ? Shading_brightness(shading, light.triangle) : 0.0);
         s.pdf = nominal_pdf(density, light.probability / s.pdf, p);
     }
+    s.chosen = index;
     if (FX_LIGHT_TREE && probability == 0.0) s.radiance = vec3(0.0);
     return s;
 }

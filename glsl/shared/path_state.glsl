@@ -61,6 +61,8 @@ struct Departure {
     vec3 sampled;
     bool shadowed;
     bool sharp; // of a light that brings sharp shadows and little noise
+    float certainty; // the probability that it was chosen, if it brings sharp shadows; else 0
+    uint chosen;     // its index
     bool alive;
 };
 

@@ -56,10 +56,11 @@ Receiver receiver_of(Surface s, Bsdf bsdf, View view) {
 
 // Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed.
 vec3 light_from_nee(Surface s, Bsdf bsdf, View view, Sampler random, uint pair, uint mask_seed,
-                    out Segment shadow, out bool sharp) {
+                    out Segment shadow, out float sharp, out uint chosen) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(receiver_of(s, bsdf, view), word, sample_2d(random, pair + PAIR_LIGHT));
     sharp = light.sharp;
+    chosen = light.chosen;
     vec3 wi = light.direction * view.basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, view.wo, wi);
     f.rgb *= light_share(s, view.facing, light.direction, wi.z);
@@ -123,7 +124,8 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
         p.albedo = min(p.path.throughput, vec3(1.0)) * (p.chosen ? vec3(1.0) : bsdf_albedo(bsdf, view.wo.z)); // roulette may exceed 1
     }
     uint seed = shadow_mask_seed(p.seed, p.bounce);
-    d.sampled = p.path.throughput * light_from_nee(s, bsdf, view, random, pair, seed, d.shadow, d.sharp);
+    d.sampled = p.path.throughput * light_from_nee(s, bsdf, view, random, pair, seed, d.shadow, d.certainty, d.chosen);
+    d.sharp = d.certainty >= SHARP_PROBABILITY;
     d.shadowed = going && push.constants.light_count > 0u && !smooth_here && largest_channel(d.sampled) > 0.0;
     d.alive = scatter(p.path, s, bsdf, view, random, pair) && going;
     p.scattered += smooth_here ? 0u : 1u;

@@ -82,6 +82,11 @@ gpu_structs! {
         light: vec3,
         /// The pixel that its first point is of, or [`NONE`] where no pixel of the cell hands on samples.
         pixel: uint,
+        /// Of that radiance what the light without extent that was chosen at the first surface brings there, times the probability of the
+        /// choice.
+        certain: vec3,
+        /// That light, or [`NONE`].
+        choice: uint,
     }
 
     /// How light has changed at the paths of a cell, or of the cells around it, linear Rec. 709, each path in units of the radiance around

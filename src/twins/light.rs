@@ -6,7 +6,7 @@ use crate::math::warp::{
     basis_from_normal, circle_point, sine_cosine, warp_cone, warp_sphere, warp_tent, warp_triangle,
 };
 use crate::scene::{Environment, Scene};
-use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
+use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE};
 use crate::twins::light_tree::{Choice, choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, coat_lets_out, plane_clearance, unit_vector};
@@ -25,8 +25,10 @@ pub struct LightSample {
     pub radiance: Vec3,
     /// Density per solid angle; 0 for lights that no BSDF sample can hit.
     pub pdf: f32,
-    /// Whether it is of a light without extent that nearly every sample chooses: sharp shadows, and little noise.
-    pub sharp: bool,
+    /// Of a light without extent, whose shadows are sharp, the probability that it is chosen; else 0.
+    pub sharp: f32,
+    /// Index of the light.
+    pub chosen: u32,
 }
 
 pub use crate::shaders::shared::segment::INFINITE_DISTANCE;
@@ -101,7 +103,7 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
         }
     };
     let radiance = if pdf > 0.0 { radiance / pdf } else { Vec3::ZERO };
-    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, sharp: false }
+    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, sharp: 0.0, chosen: 0 }
 }
 
 /// A triangle seen from a point: unit vectors to its corners, and its solid angle in steradians.
@@ -179,7 +181,14 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
         false => light.probability * 2.0 * d2 / (cosine * doubled_area),
     };
     let pdf = if lit { density } else { 0.0 };
-    LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf, sharp: false }
+    LightSample {
+        direction,
+        distance,
+        radiance: if lit { radiance / pdf } else { Vec3::ZERO },
+        pdf,
+        sharp: 0.0,
+        chosen: 0,
+    }
 }
 
 /// 1 - cosine of half the angle that a sphere takes up, seen from outside; 0 from inside.
@@ -210,12 +219,9 @@ fn sample_sphere_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightS
         distance,
         radiance: if lit { Vec3::from(light.value) * coat / pdf } else { Vec3::ZERO },
         pdf,
-        sharp: false,
+        sharp: 0.0,
+        chosen: 0,
     }
-}
-
-fn is_sharp(light: &Light) -> bool {
-    light.probability >= SHARP_PROBABILITY
 }
 
 /// What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
@@ -233,17 +239,17 @@ fn unshadowed(light: &Light, r: &Receiver) -> f32 {
 
 /// Chooses anew among the point and spot lights, which lie before those with a surface: by what each would bring if nothing were in
 /// its way.
-fn choose_by_share(scene: &Scene, r: &Receiver, u: f32) -> Light {
-    let before_surfaces = scene.lights.iter().take_while(|light| !light.has_surface());
+fn choose_by_share(scene: &Scene, r: &Receiver, u: f32) -> (Light, u32) {
+    let before_surfaces = (0..).zip(&scene.lights).take_while(|(_, light)| !light.has_surface());
     let group: Vec<_> =
-        before_surfaces.filter(|light| light.is_point_or_spot()).map(|l| (l, unshadowed(l, r))).collect();
-    let probability: f32 = group.iter().map(|(light, _)| light.probability).sum();
-    let lit = || group.iter().filter(|(_, brings)| *brings > 0.0);
-    let (sum, number) = (lit().map(|(_, brings)| brings).sum::<f32>(), lit().count() as f32);
-    let (mut before, mut chosen) = (0.0, Light { probability, value: [0.0; 3], ..scene.lights[0] });
-    for &(light, brings) in lit() {
+        before_surfaces.filter(|(_, light)| light.is_point_or_spot()).map(|(i, l)| (i, l, unshadowed(l, r))).collect();
+    let probability: f32 = group.iter().map(|(_, light, _)| light.probability).sum();
+    let lit = || group.iter().filter(|(.., brings)| *brings > 0.0);
+    let (sum, number) = (lit().map(|(.., brings)| brings).sum::<f32>(), lit().count() as f32);
+    let (mut before, mut chosen) = (0.0, (Light { probability, value: [0.0; 3], ..scene.lights[0] }, 0));
+    for &(index, light, brings) in lit() {
         let share = mixed(brings / sum, number);
-        chosen = Light { probability: probability * share, ..*light };
+        chosen = (Light { probability: probability * share, ..*light }, index);
         before += share;
         if u < before {
             break;
@@ -266,7 +272,7 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     if light.kind == LIGHT_SPOT {
         radiance *= spot_share(light, direction);
     }
-    LightSample { direction, distance, radiance, pdf: 0.0, sharp: is_sharp(light) }
+    LightSample { direction, distance, radiance, pdf: 0.0, sharp: light.probability, chosen: 0 }
 }
 
 /// Density over area by which MIS takes a lamp to be chosen.
@@ -286,12 +292,12 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
             Choice { light, rest, probability: 0.0 }
         }
     };
-    let (mut light, p) = (scene.lights[chosen as usize], r.position);
+    let (mut light, mut index, p) = (scene.lights[chosen as usize], chosen, r.position);
     if by_tree && probability > 0.0 {
         light.probability = probability;
     }
     if scene.weighed_lights && light.is_point_or_spot() {
-        light = choose_by_share(scene, r, u.x);
+        (light, index) = choose_by_share(scene, r, u.x);
     }
     let mut sample = match light.kind {
         _ if light.is_triangle() => sample_triangle_light(scene, &light, p, u),
@@ -302,7 +308,8 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
             distance: INFINITE_DISTANCE,
             radiance: Vec3::from(light.value) / light.probability,
             pdf: 0.0,
-            sharp: is_sharp(&light),
+            sharp: light.probability,
+            chosen: 0,
         },
         _ => sample_environment(scene, &light, rest, u),
     };
@@ -311,6 +318,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         let density = lamp_density(scene, light.material, brightness);
         sample.pdf = nominal_pdf(scene, density, light.probability / sample.pdf, p);
     }
+    sample.chosen = index;
     if by_tree && probability == 0.0 {
         sample.radiance = Vec3::ZERO;
     }

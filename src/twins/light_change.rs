@@ -2,7 +2,7 @@
 use crate::layout::{Camera, History, LightChange, NONE, Probe, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::render::Carried;
-use crate::shaders::light_change::LEAST_SPACING;
+use crate::shaders::light_change::{CERTAIN_ACROSS, LEAST_SPACING};
 use crate::shaders::shared::probe_cell::PROBE_CELL;
 use crate::twins::path::Tracer;
 use glam::Vec3;
@@ -53,8 +53,9 @@ pub fn before(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], (offered, 
     let probe = |cell| match chosen_pixel(cell, size, seed, hands_on) {
         NONE => Probe { pixel: NONE, ..Probe::default() },
         pixel => {
-            let light = tracer.light_from(points[pixel as usize], eye.position.into(), sample_of(cell, size)).into();
-            Probe { light, pixel, ..Probe::default() }
+            let sample = tracer.light_from(points[pixel as usize], eye.position.into(), sample_of(cell, size));
+            let (light, certain) = (sample.radiance().into(), sample.certain.into());
+            Probe { light, certain, choice: sample.choice, pixel, ..Probe::default() }
         }
     };
     (0..across * down).map(probe).collect()
@@ -80,6 +81,13 @@ fn share_of_light(difference: Vec3, light: f32, around: Vec3) -> LightChange {
     LightChange { sum: sum.into(), size, squares: size * size, light: light / unit, count: 1, ..LightChange::default() }
 }
 
+/// The share of the light around a pixel that has come or gone without noise.
+fn certain_change([now, before]: [Vec3; 2], around: Vec3) -> f32 {
+    let change = (now - before).abs().max_element();
+    let most = around.max_element().max(now.max(before).max_element());
+    if change.is_finite() { change / most.max(1e-30) } else { 0.0 }
+}
+
 /// What has changed on the same paths; `records` are those of the last frame, numbered as in the changed scene.
 pub fn after(tracer: &Tracer, eye: &Camera, records: &[History], probes: &[Probe]) -> Vec<LightChange> {
     let size = tracer.frame.path.size;
@@ -90,11 +98,18 @@ pub fn after(tracer: &Tracer, eye: &Camera, records: &[History], probes: &[Probe
         let pixel = probe.pixel as usize;
         let History { triangle, instance, weights, .. } = records[pixel];
         let point = SurfacePoint { triangle, instance, weights, ..SurfacePoint::default() };
-        let light = tracer.light_from(point, eye.position.into(), sample_of(cell, size));
+        let sample = tracer.light_from(point, eye.position.into(), sample_of(cell, size));
+        let (light, around) = (sample.radiance(), light_around(records, pixel, size));
         let difference = light - Vec3::from(probe.light);
         let brightest = light.max(probe.light.into()).max_element();
         match difference.is_finite() {
-            true => share_of_light(difference, brightest, light_around(records, pixel, size)),
+            true => LightChange {
+                change: match sample.choice == probe.choice && probe.choice != NONE {
+                    true => certain_change([sample.certain, probe.certain.into()], around),
+                    false => 0.0,
+                },
+                ..share_of_light(difference, brightest, around)
+            },
             false => LightChange::default(),
         }
     };
@@ -105,11 +120,14 @@ pub fn after(tracer: &Tracer, eye: &Camera, records: &[History], probes: &[Probe
 pub fn sums(found: &[LightChange], cells: [u32; 2], spacing: u32) -> Vec<LightChange> {
     let [width, height] = cells.map(|n| n as i32);
     let sum = |i: i32| {
-        let around =
-            (0..9).map(|k| [i % width + (k % 3 - 1) * spacing as i32, i / width + (k / 3 - 1) * spacing as i32]);
-        let inside = around.filter(|[x, y]| (0..width).contains(x) && (0..height).contains(y));
+        let inside = |across: i32, spacing: i32| {
+            let at = move |k: i32| [k % across - across / 2, k / across - across / 2].map(|n| n * spacing);
+            let around = (0..across * across).map(move |k| [i % width + at(k)[0], i / width + at(k)[1]]);
+            let inside = around.filter(move |[x, y]| (0..width).contains(x) && (0..height).contains(y));
+            inside.map(|[x, y]| &found[(y * width + x) as usize])
+        };
         let mut all = LightChange::default();
-        for other in inside.map(|[x, y]| &found[(y * width + x) as usize]) {
+        for other in inside(3, spacing as i32) {
             all.sum = (Vec3::from(all.sum) + Vec3::from(other.sum)).into();
             all.squares += other.squares;
             all.size += other.size;
@@ -121,7 +139,11 @@ pub fn sums(found: &[LightChange], cells: [u32; 2], spacing: u32) -> Vec<LightCh
             _ => Vec3::from(all.sum).abs().max_element(),
         };
         let change = if size > 0.0 { size / all.light } else { 0.0 };
-        LightChange { change: found[i as usize].change.max(change), ..all }
+        let before = match spacing {
+            LEAST_SPACING => inside(CERTAIN_ACROSS, 1).map(|other| other.change).fold(0.0, f32::max),
+            _ => found[i as usize].change,
+        };
+        LightChange { change: before.max(change), ..all }
     };
     (0..width * height).map(sum).collect()
 }

@@ -4,6 +4,7 @@ use crate::layout::{
 };
 use crate::math::hash::pcg;
 use crate::scene::Scene;
+use crate::shaders::shared::light::SHARP_PROBABILITY;
 use crate::shaders::shared::path_step::{
     LEAST_REST, MAX_SURVIVAL, ODDS_BEYOND_COSINE, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE,
     PAIRS_PER_BOUNCE,
@@ -34,6 +35,11 @@ pub struct PathSample {
     pub indirect: Vec3,
     /// What that radiance has been multiplied by: see [`crate::layout::PixelLight::albedo`].
     pub albedo: Vec3,
+    /// What the light that was chosen at the first surface that is not smooth brings there, times the probability of that choice, if it has
+    /// no extent.
+    pub certain: Vec3,
+    /// That light, or [`NONE`] where the path had the choice between two ways, or never came to such a surface.
+    pub choice: u32,
     /// Number of rays, shadow rays included.
     pub rays: u32,
     /// Whether the light was not finite, and counts as black.
@@ -64,6 +70,16 @@ enum Kind {
     Direct,
     Indirect,
     Soft,
+}
+
+/// One light sampled at a surface.
+struct SampledLight {
+    /// What it brings; `None` where no shadow ray is needed.
+    brought: Option<Vec3>,
+    /// As of a [`LightSample`](crate::twins::light::LightSample).
+    sharp: f32,
+    /// Index of the light.
+    chosen: u32,
 }
 
 /// As `kind_of_light` of the kernel.
@@ -193,14 +209,14 @@ impl Tracer<'_> {
         surface_emission(self.scene, s, cosine.abs()) * weight
     }
 
-    /// The light, and whether it is sharp; `None` where no shadow ray is needed.
-    fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<(Vec3, bool)> {
+    fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> SampledLight {
         let s = &p.surface;
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
         let light =
             light_sample(self.scene, &receiver_of(s, &p.bsdf, &p.view), word, sample_2d(random, p.pair + PAIR_LIGHT));
+        let none = SampledLight { brought: None, sharp: light.sharp, chosen: light.chosen };
         if light.radiance == Vec3::ZERO {
-            return None;
+            return none;
         }
         let wi = p.view.basis.transpose() * light.direction;
         let f = bsdf_evaluate(&p.bsdf, p.view.wo, wi);
@@ -208,7 +224,7 @@ impl Tracer<'_> {
         let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
         let contribution = f.truncate() * share * light.radiance * weight;
         if contribution.max_element() <= 0.0 || contribution.is_nan() {
-            return None;
+            return none;
         }
         let origin = s.ray_origin(light.direction);
         let (mut direction, mut distance) = (light.direction, light.distance);
@@ -218,7 +234,7 @@ impl Tracer<'_> {
         }
         let mask_seed = mask_seed | if light.pdf == 0.0 { PASSES_WALLS } else { 0 };
         let left = light_left(self.scene, p.from, origin, direction, distance, mask_seed);
-        Some((contribution * left, light.sharp))
+        SampledLight { brought: Some(contribution * left), ..none }
     }
 
     fn scatter(&self, path: &mut Path, p: &Shade, random: Sampler) -> bool {
@@ -257,6 +273,7 @@ impl Tracer<'_> {
     /// `first` is what the path's first ray finds. A path that is `sharp_only` ends where only light can come that a filter takes.
     fn trace_path(&self, mut path: Path, sharp_only: bool, first: Hit, random: Sampler, seed: u32) -> PathSample {
         let (mut sum, mut rays, mut seen) = (Sum::default(), 0, Seen::default());
+        let (mut certain, mut choice) = (Vec3::ZERO, NONE);
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
@@ -288,11 +305,16 @@ impl Tracer<'_> {
             let soft = self.effects.soft_light;
             let ends = sharp_only && seen.scattered > u32::from(!soft);
             if self.frame.path.light_count > 0 && !smooth_here {
-                let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(2));
-                let light = light.filter(|&(_, sharp)| !ends || (soft && sharp));
-                rays += u32::from(light.is_some());
-                let (light, sharp) = light.unwrap_or_default();
-                self.add_light(&mut sum, path.throughput * light, kind_of_light(&seen, sharp));
+                let SampledLight { brought, sharp, chosen } =
+                    self.light_from_nee(&p, random, mask_seed.wrapping_add(2));
+                let is_sharp = sharp >= SHARP_PROBABILITY;
+                let brought = brought.filter(|_| !ends || (soft && is_sharp));
+                rays += u32::from(brought.is_some());
+                let light = path.throughput * brought.unwrap_or_default();
+                self.add_light(&mut sum, light, kind_of_light(&seen, is_sharp));
+                if seen.scattered == 1 && choice == NONE && !seen.chosen {
+                    (certain, choice) = (sharp * light, chosen);
+                }
             }
             if !self.scatter(&mut path, &p, random) || ends {
                 break;
@@ -308,6 +330,8 @@ impl Tracer<'_> {
             direct: sum.direct,
             indirect: if sharp_only { Vec3::ZERO } else { filtered },
             albedo: seen.albedo,
+            certain,
+            choice,
             rays,
             broken: false,
         }
@@ -328,13 +352,31 @@ impl Tracer<'_> {
             false => PathSample { direct: Vec3::ZERO, indirect: Vec3::ZERO, broken: true, ..sample },
         }
     }
-    /// Radiance from a point towards `eye`, by the path that `probe.comp` traces with this sample.
-    pub fn light_from(&self, at: SurfacePoint, eye: Vec3, index: u32) -> Vec3 {
+    /// What comes from a point towards `eye`, by the path that `probe.comp` traces with this sample.
+    pub fn light_from(&self, at: SurfacePoint, eye: Vec3, index: u32) -> PathSample {
         let mut hit = Hit { t: 0.0, triangle: at.triangle, instance: at.instance, barycentric: at.weights.into() };
         let off = surface_at(self.scene, &hit).position - eye;
         hit.t = off.length();
         let random = sampler_start(0, index, self.frame.path.seed, self.effects.independent_sampler);
         let path = Path::new(eye, off / hit.t.max(1e-37));
-        self.trace_path(path, false, hit, random, path_seed(&self.frame, 0, index)).radiance()
+        self.trace_path(path, false, hit, random, path_seed(&self.frame, 0, index))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shaders::shared::camera::{PAIR_FILM, PAIR_LENS};
+
+    /// A pair that decides two things makes one depend on the other.
+    #[test]
+    fn no_two_decisions_of_a_path_use_the_same_random_numbers() {
+        let events = [PAIR_CHOICE, PAIR_LIGHT, PAIR_BSDF, PAIR_ROULETTE];
+        let of_bounce = |bounce: u32| events.map(|pair| PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce + pair);
+        let mut pairs = [PAIR_FILM, PAIR_LENS].into_iter().chain((0..4).flat_map(of_bounce)).collect::<Vec<_>>();
+        let all = pairs.len();
+        pairs.sort_unstable();
+        pairs.dedup();
+        assert_eq!(pairs.len(), all);
     }
 }

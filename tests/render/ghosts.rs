@@ -146,6 +146,45 @@ fn light_that_has_changed_leaves_no_ghost() {
     assert_silent(&gpu);
 }
 
+/// A thin post whose shadow, a pixel or two wide, walks over a floor that a sun without noise lights: few probes meet what it takes, and
+/// fewer what it gives back. Lamps beside the sun are chosen half of the time.
+#[test]
+fn a_narrow_shadow_leaves_no_trail() {
+    let gpu = gpu();
+    let text = "[camera]\nposition = [0.0, 5.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n\
+                [[mesh]]\nshape = 'rectangle'\ntransform = { rotate = [-90.0, 0.0, 0.0], scale = 6.0 }\n\
+                [[mesh]]\nname = 'board'\nshape = 'cube'\n[[instance]]\nname = 'board'\nmesh = 'board'\n\
+                transform = { scale = [0.06, 1.0, 0.06], translate = [-1.0, 1.5, 0.0] }\n\
+                [[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, -0.7]\nirradiance = 3.0\n";
+    let shade = |settings: Reproject| {
+        let mut scene = Workplace::new().scene(text);
+        (scene.settings.width, scene.settings.height, scene.settings.spp, scene.settings.max_depth) = (65, 49, 8, 2);
+        let mut stage = Stage::new(&gpu, scene, settings);
+        let (camera, mut off) = (stage.film.camera, 0.0);
+        for frame in 0..12 {
+            let x = -1.0 + 0.12 * f64::from(frame);
+            let place = stage.scene.rig.placement("board").unwrap();
+            let at = Transform::try_from([0.06, 0., 0., x, 0., 1., 0., 1.5, 0., 0., 0.06, 0., 0., 0., 0., 1.]).unwrap();
+            let change = stage.scene.apply(&Pose { instances: vec![(place, at)], ..Pose::default() }).unwrap();
+            stage.film.record(|renderer, rec| renderer.update(rec, &stage.scene, &change));
+            let mut resources = FrameResources::new(&gpu).unwrap();
+            gpu.run(&mut resources, |rec| stage.still.update(rec, &stage.scene, &change)).unwrap();
+            stage.film.frame(camera);
+            let truth = stage.light(camera);
+            let error = |(s, t): (PixelStats, &f64)| (f64::from(s.mean[1]) - t).powi(2);
+            off += if frame < 3 { 0.0 } else { stage.film.stats().into_iter().zip(&truth).map(error).sum::<f64>() };
+        }
+        off
+    };
+    let none = shade(Reproject { reproject_samples: 1, reproject_light: 0.0, ..Reproject::default() });
+    for way in WAYS {
+        let [found, kept] = [shade(by(way)), shade(Reproject { reproject_light: 1e9, ..by(way) })];
+        assert!(found < 1.6 * none, "{way:?}: an error of {found}, {none} of frames alone");
+        assert!(kept > 2.0 * found, "control: {kept} where all is kept");
+    }
+    assert_silent(&gpu);
+}
+
 /// A veil that stops half of what is seen through it, before a black ball on a bright sky: nothing lights up or goes dark where paths begin.
 fn veil() -> Loaded {
     let mut scene = Workplace::new().scene(

@@ -207,7 +207,7 @@ fn agree_where_all_moves(gpu: &Gpu, settings: Reproject, step: [f32; 3]) -> (u64
         film.renderer.steps().skip(1).for_each(|step| film.step(&step));
     }
     let all = cells * MOMENTS.len();
-    assert!(all_alike * 5 >= all * 4, "{all_alike} of {all} cells");
+    assert!(all_alike * 20 >= all * 19, "{all_alike} of {all} cells");
     (lit, carried)
 }
 
@@ -238,6 +238,21 @@ fn changes_of_light_are_shares_of_it() {
     // In wider windows one path counts. Cells that are no multiple of three away belong to the sums of others.
     let alone = |at: usize| (0..9).map(|i| change(f32::from(u8::from(i == at)))).collect::<Vec<_>>();
     assert_eq!([found(&alone(4), 3), found(&alone(5), 3), found(&alone(4), 9)], [0.5, 0.0, 0.5]);
+    // What has changed without noise counts by itself, two cells away, and in wider windows where it was found.
+    let sums = |at: usize, spacing| {
+        let certain = |i: usize| LightChange {
+            change: if i == at { 0.5 } else { 0.0 },
+            light: 2.0,
+            count: 1,
+            ..Default::default()
+        };
+        let changes = light_change::sums(&(0..49).map(certain).collect::<Vec<_>>(), [7, 7], spacing);
+        changes.iter().map(|sum| sum.change).collect::<Vec<_>>()
+    };
+    let found = sums(24, 1);
+    let square = |i: usize| (1..6).contains(&(i % 7)) && (1..6).contains(&(i / 7));
+    assert!((0..49).all(|i| found[i] == if square(i) { 0.5 } else { 0.0 }), "{found:?}");
+    assert_eq!(sums(24, 3).iter().enumerate().filter(|(_, change)| **change > 0.0).collect::<Vec<_>>(), [(24, &0.5)]);
     assert_eq!([light_change::probe_cell_of(0, [9, 9]), light_change::probe_cell_of(9 * 4 + 8, [9, 9])], [0, 5]);
 }
 

@@ -10,7 +10,7 @@ use crate::shaders;
 use crate::shaders::shared::probe_cell::PROBE_CELL;
 use crate::shaders::shared::{deal, light};
 
-/// The kernels and buffers of probes: one path for each cell of 4x4 pixels, 5 bytes a pixel.
+/// The kernels and buffers of probes: one path for each cell of 4x4 pixels, 6 bytes a pixel.
 pub struct Probes {
     /// Traces them.
     pub trace: Kernel<shaders::probe::Bind<'static>>,

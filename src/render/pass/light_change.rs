@@ -70,7 +70,8 @@ mod tests {
         let change = |i: u32| {
             let sum = [1, 2, 3].map(|k| 2.0 * unit(i, k) - 1.0);
             let size = sum.iter().fold(0.0f32, |most, v| most.max(v.abs()));
-            LightChange { sum, size, squares: size * size, light: 1.0 + unit(i, 4), count: 1, ..Default::default() }
+            let (light, change) = (1.0 + unit(i, 4), if unit(i, 6) < 0.02 { unit(i, 7) } else { 0.0 });
+            LightChange { sum, size, squares: size * size, light, change, count: 1 }
         };
         let found = |i: u32| if unit(i, 5) < 0.2 { LightChange::default() } else { change(i) };
         for cells in [[1, 1], [17, 9], [64, 1], [65, 2], [1, 31], [40, 29]] {
