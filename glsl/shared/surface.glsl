@@ -151,10 +151,15 @@ Surface surface_at(Hit hit) {
     Shading at = Shading_load(shading, hit.triangle);
     s.brightness = at.brightness;
     if (FX_SMOOTH_NORMALS && (at.normal.x & at.normal.y & at.normal.z) != 0xffffffffu) {
-        vec3 n = mix(octahedral_decode(at.normal.x), octahedral_decode(at.normal.y), hit.b1) +
-                 hit.b2 * (octahedral_decode(at.normal.z) - octahedral_decode(at.normal.x));
+        vec3 n0 = octahedral_decode(at.normal.x), n1 = octahedral_decode(at.normal.y), n2 = octahedral_decode(at.normal.z);
         float len;
-        n = unit_vector(normals_from_object * n, len);
+        if (FX_INSTANCES && hit.instance != NONE) {
+            // As of a mesh that is stored where it stands: scales that differ would let one normal count for more than another.
+            n0 = unit_vector(normals_from_object * n0, len);
+            n1 = unit_vector(normals_from_object * n1, len);
+            n2 = unit_vector(normals_from_object * n2, len);
+        }
+        vec3 n = unit_vector(mix(n0, n1, hit.b1) + hit.b2 * (n2 - n0), len);
         s.smooth_normal = s.normal = s.coat_normal = len > 0.0 ? n : s.geometric;
     }
     if (FX_VERTEX_COLORS) s.color = vertex_color(at, vec2(hit.b1, hit.b2));

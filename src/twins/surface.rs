@@ -237,9 +237,10 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     let mut s = Surface { triangle: [p0, e1, e2], ..Surface::bare(scene, hit, position, geometric, clearance) };
     let Some(shading) = scene.shading.get(hit.triangle as usize) else { return s };
     if shading.normal != FLAT {
-        let [n0, n1, n2] = shading.normal.map(octahedral_decode);
+        let placed = |n| instance.map_or(n, |i| unit_vector(object_from_world(i).normal(n)).0);
+        let [n0, n1, n2] = shading.normal.map(|n| placed(octahedral_decode(n)));
         let n = n0 * (1.0 - hit.barycentric.x) + n1 * hit.barycentric.x + hit.barycentric.y * (n2 - n0);
-        let (n, length) = unit_vector(instance.map_or(n, |i| object_from_world(i).normal(n)));
+        let (n, length) = unit_vector(n);
         s.normal = if length > 0.0 { n } else { geometric };
         s.smooth_normal = s.normal;
     }
