@@ -18,9 +18,7 @@ layout(scalar, binding = 6) writeonly buffer Sharp { vec4 sharp[]; };
 layout(binding = 7) uniform samplerBuffer blur; // of float, where the lens counts: how far it blurs what a pixel shows
 layout(scalar, push_constant) uniform Push { SizePush push; };
 
-// A pixel with less than the share WHOLE of a neighbour's albedo, or more than OUTLIER times its neighbours' median light, may
-// partly show something without albedo.
-const float WHOLE = 0.98;
+// A pixel with more than this many times its neighbours' median light may partly show something without albedo.
 const float OUTLIER = 2.0;
 const float MIRRORED = 0.6; // 6 of 9 pixels, which the rim of a mirror has around it
 

@@ -4,6 +4,9 @@
 // Smaller albedos are divided by this; a pixel with no larger one counts as reflecting nothing.
 const float SMALLEST_ALBEDO = 0.01;
 
+// A pixel with less than this share of a neighbour's albedo may partly show something without.
+const float WHOLE = 0.98;
+
 // Returns 0 for NaN and infinities.
 float number(float v) { return finite(v) ? v : 0.0; }
 

@@ -112,7 +112,7 @@ impl Demodulated {
         let Some(direct) = &self.direct else { return Ok(()) };
         let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
         let bind = demodulate_direct::Bind { noisy: image, direct: &direct.plane };
-        rec.dispatch_threads(&direct.split, bind, &PackPush { count, ..Default::default() }, count)
+        rec.dispatch_threads(&direct.split, bind, &SizePush { size, ..Default::default() }, count)
     }
 
     /// All pixels: what is filtered of them, once [`Demodulated::record_fill`] has run.

@@ -5,8 +5,8 @@ use super::{Demodulation, Holds};
 use crate::image::aov::Aovs;
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::demodulate::{MIRRORED, OUTLIER, WHOLE};
-use crate::shaders::shared::albedo::SMALLEST_ALBEDO;
+use crate::shaders::demodulate::{MIRRORED, OUTLIER};
+use crate::shaders::shared::albedo::{SMALLEST_ALBEDO, WHOLE};
 use glam::Vec3;
 
 /// A noisy image on the host: see [`super::Noisy`].
@@ -36,7 +36,8 @@ pub struct Parts {
     pub factor: Vec<vec3>,
     /// Variance of what does not go through the filter, mean over channels; 0 where none is known.
     pub sharp_variance: Vec<f32>,
-    /// Direct light before albedo, for a filter to in-paint, where some pixels (0 samples) have none of their own.
+    /// Direct light before albedo, for a filter to in-paint, where some pixels (0 samples) have none of their own. Some hand none on
+    /// (fewer than 0).
     pub direct: Option<FilterInput>,
 }
 
@@ -111,8 +112,11 @@ fn demodulate_direct(pixels: &Pixels) -> Vec<vec4> {
     let pixel = |i: usize| {
         let (direct, factor) = (pixels.light[i].direct, factor_of_direct(pixels.albedo(i)));
         let [r, g, b] = std::array::from_fn(|c| direct[c] / factor[c]);
-        let lit = pixels.count(i) != 0.0 && direct.iter().all(|v| v.is_finite());
-        if lit { [r, g, b, pixels.count(i)] } else { [0.0; 4] }
+        match pixels.count(i) != 0.0 && direct.iter().all(|v| v.is_finite()) {
+            false => [0.0; 4],
+            true if shows_in_part(pixels, i) => [0.0, 0.0, 0.0, -pixels.count(i)],
+            true => [r, g, b, pixels.count(i)],
+        }
     };
     (0..pixels.light.len()).map(pixel).collect()
 }
@@ -266,6 +270,13 @@ fn is_rim(pixels: &Pixels, i: usize) -> bool {
     others.sort_by(f32::total_cmp);
     let median = others.get(others.len() / 2).copied().unwrap_or(0.0);
     light(i) > OUTLIER * median || neighbours().any(|q| largest(albedo(i)) < WHOLE * largest(albedo(q)))
+}
+
+/// A surface in part, and beside it something without albedo.
+fn shows_in_part(pixels: &Pixels, i: usize) -> bool {
+    let (own, around) = (pixels.albedo(i), || neighbours(pixels.size, i, 1).map(|q| pixels.albedo(q)));
+    let partly = around().any(|theirs| largest(own) < WHOLE * largest(theirs));
+    reflects(own) && partly && around().any(|theirs| !reflects(theirs))
 }
 
 /// Noisy or black without albedo, as most pixels around it are.

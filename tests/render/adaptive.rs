@@ -1,8 +1,10 @@
 //! Tests renders that place their samples: they have the same bits however they are cut, interrupted or dealt to rounds, the right
 //! mean, and defined values in pixels without a sample.
-use crate::support::{assert_silent, gpu};
+use crate::support::{assert_silent, gpu, largest};
 use std::ops::ControlFlow;
 use std::path::Path;
+use tallow::denoise::filter::{FILTERS, FilterSettings};
+use tallow::denoise::{Demodulation, Denoiser};
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::{self, Samples, WriteOptions};
@@ -376,7 +378,9 @@ fn geometry_is_unbiased_and_learning_nearly_so() {
         (mean, (average(means.iter().map(|m| (m - mean).powi(2))) / 7.0).sqrt())
     };
     let reference = picture("uniform", 256, 2);
-    for (policy, min_spp, bias) in [("geometry", 2, 0.0), ("variance", 4, 0.02), ("both", 4, 0.02), ("both", 1, 0.02)] {
+    for (policy, min_spp, bias) in
+        [("geometry", 2, 0.0), ("variance", 4, 0.02), ("both", 4, 0.02), ("both", 1, 0.02), ("threshold", 16, 0.02)]
+    {
         let (mean, error) = picture(policy, 32, min_spp);
         let off = (mean - reference.0).abs();
         println!("{policy}: {mean:.5} +- {error:.5}, uniform {:.5} +- {:.5}", reference.0, reference.1);
@@ -416,6 +420,31 @@ fn no_pixel_exceeds_the_largest_number() {
         let scene = scene(|s| (s.allocate.policy, s.allocate.max_spp) = (tallow::allocate::policy(policy).unwrap(), 9));
         let pixels = render(&gpu, &scene);
         assert_eq!((total(&pixels), pixels.iter().map(|p| p.stats.count).max()), (8 * 33 * 17, Some(9)), "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
+/// A white ball in a constant sky, most of which gets no sample: whatever fills it in, nothing is brighter than the sky, to the noise of
+/// four samples.
+#[test]
+fn sky_without_samples_takes_no_more_light_than_there_is() {
+    let text = "[film]\nwidth = 64\nheight = 64\n[camera]\nposition = [0, 0, 3]\ntarget = [0, 0, 0]\nfov = 40\n[render]\nspp = 4\n\
+                max_depth = 3\n[environment]\nradiance = 0.5\n[[mesh]]\nshape = 'sphere'\nmaterial = 'white'\n\
+                transform = { scale = 0.5 }\n[[material]]\nname = 'white'\ncolor = 0.8\n";
+    let place = |s: &mut Settings| {
+        (s.allocate.policy, s.allocate.min_spp) = (tallow::allocate::policy("geometry").unwrap(), 0);
+    };
+    let (gpu, scene) = (gpu(), Scene::parse(Path::new("ball.toml"), text).unwrap().with(place));
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    let pixels = run(&renderer, &mut FrameResources::new(&gpu).unwrap());
+    let empty = pixels.iter().filter(|pixel| pixel.stats.count == 0).count();
+    assert!(empty > 1000, "control: {empty} pixels have no sample");
+    for row in &FILTERS[1..] {
+        let denoiser = Denoiser::new(&gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light).unwrap();
+        gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
+        let picture = denoiser.picture().read().unwrap();
+        let most = largest(picture.iter().flat_map(|pixel| &pixel[..3]).copied());
+        assert!((0.45..0.6).contains(&most), "{}: {most}", row.name);
     }
     assert_silent(&gpu);
 }

@@ -140,8 +140,8 @@ fn direct_light_is_left_out_also_where_pixels_lack_it() {
     assert_eq!((all[0], unlit), ([1.0, 1.0, 1.0, 4.0], None));
     let (sparse, unlit) = counts([4, 0, 4, 4]);
     assert_eq!(sparse[..2], [[1.0, 1.0, 1.0, 4.0], [1.0, 1.0, 1.0, 0.0]]);
-    // Before albedo; the lamp's own light.
-    let lit = [[1.0, 1.0, 1.0, 4.0], [0.0; 4], [100.0, 100.0, 100.0, 4.0], [50.0, 50.0, 50.0, 4.0]];
+    // Before albedo; nothing of the lamp's rim, and the lamp's own light.
+    let lit = [[1.0, 1.0, 1.0, 4.0], [0.0; 4], [0.0, 0.0, 0.0, -4.0], [50.0, 50.0, 50.0, 4.0]];
     assert_eq!(unlit.unwrap(), lit);
     // A broken pixel counts as one without samples.
     let red = film.channels.iter_mut().filter(|c| ["R", "direct.R"].contains(&c.name.as_str()));
@@ -154,6 +154,23 @@ fn direct_light_is_left_out_also_where_pixels_lack_it() {
     let red = film.channels.iter_mut().find(|c| c.name == "R").unwrap();
     red.samples = Samples::F32(vec![1.0, 1.0, 25.0, 50.0]);
     assert_eq!(take_apart(&film, Demodulation::Light).input.radiance[1][3], 0.0);
+}
+
+/// Of four samples three met the sky of .5, and one a surface of albedo .8: neither the sky beside it nor the surface takes that light.
+#[test]
+fn pixels_that_show_a_surface_in_part_hand_no_direct_light_on() {
+    let mut film = Film::new(4, 1);
+    film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+    film.add_vec3("", RGB, &[[0.4; 3], [0.475; 3], [0.0; 3], [0.5; 3]]);
+    film.add_vec3("albedo", RGB, &[[0.8; 3], [0.2; 3], [0.0; 3], [0.0; 3]]);
+    film.add_vec3("direct", RGB, &[[0.4; 3], [0.475; 3], [0.0; 3], [0.5; 3]]);
+    film.add_vec3("indirect", RGB, &[[0.0; 3]; 4]);
+    film.add("samples", Samples::U32(vec![4, 4, 0, 4]));
+    let mut parts = take_apart(&film, Demodulation::Light);
+    let lit = [[0.5, 0.5, 0.5, 4.0], [0.0, 0.0, 0.0, -4.0], [0.0; 4], [0.5, 0.5, 0.5, 4.0]];
+    assert_eq!(parts.direct.as_ref().unwrap().radiance, lit);
+    parts.remodulate_direct(&[[0.5; 4]; 4]);
+    assert_eq!(parts.sharp, [[0.4; 3], [0.475; 3], [0.5; 3], [0.5; 3]], "it keeps its own");
 }
 
 /// However the image is taken apart, and whatever its other layers hold.
