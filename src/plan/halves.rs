@@ -11,8 +11,10 @@ const REACH: usize = 2;
 /// What squared errors are divided by: the square of the radiance, plus relMSE's constant. The radiance is the mean of both images, moved
 /// towards that of the 5 x 5 pixels around by the share that noise has in the variance among these (Lee 1980): unmoved, a bright outlier
 /// would divide its own error, and moved wholly, a dark pixel beside a lamp would count for nothing. In a picture of small
-/// lamps out of focus, 4 to 32 samples tell 0.8 to 1.1 of the true error.
-pub fn scales(width: usize, [a, b]: [&Pixels; 2]) -> Vec<[f64; 3]> {
+/// lamps out of focus, 4 to 32 samples tell 0.8 to 1.1 of the true error. `noisy` are unfiltered images of the same: where the product
+/// of both, which is the square of the radiance on average, says more, it counts. A filter that takes a lamp of a pixel or two for noise
+/// would leave the error of that lamp to be divided by what is around it.
+pub fn scales(width: usize, [a, b]: [&Pixels; 2], noisy: [&Pixels; 2]) -> Vec<[f64; 3]> {
     let height = a.len() / width.max(1);
     let scale = |i: usize| {
         let (x, y) = (i % width, i / width);
@@ -29,7 +31,9 @@ pub fn scales(width: usize, [a, b]: [&Pixels; 2]) -> Vec<[f64; 3]> {
             let variance = (square - mean * mean).max(f64::MIN_POSITIVE);
             let [a, b] = halves(i);
             let own = 0.5 * (a + b);
-            (own + (noise / variance).min(1.0) * (mean - own)).powi(2) + RELMSE_EPSILON
+            let moved = (own + (noise / variance).min(1.0) * (mean - own)).powi(2);
+            let product: f64 = noisy.iter().map(|image| f64::from(image[i][c])).product();
+            moved.max(product) + RELMSE_EPSILON
         })
     };
     (0..a.len()).into_par_iter().map(scale).collect()
@@ -71,11 +75,11 @@ mod tests {
         // Two pixels of true radiance 1: noise of +-1, and a filter that halves it and darkens by .2.
         let (a, b) = (image(&[2.0, 0.0]), image(&[0.0, 2.0]));
         let (fa, fb) = (image(&[1.3, 0.3]), image(&[0.3, 1.3]));
-        let scales = scales(2, [&a, &b]);
+        let scales = scales(2, [&a, &b], [&a, &b]);
         assert!((scales[0][0] - 1.01).abs() < 1e-12);
         assert!((error([&a, &b], &scales) - 2.0 / 1.01).abs() < 1e-9);
         // The means of the filtered pixels are .8.
-        let of_filtered = super::scales(2, [&fa, &fb]);
+        let of_filtered = super::scales(2, [&fa, &fb], [&a, &b]);
         assert!(of_filtered.iter().flatten().all(|scale| (scale - (0.64 + RELMSE_EPSILON)).abs() < 1e-6));
         // By hand: (1.69 + .09) / 2 - 0 - .3 * 2 + 0 and the same of the other pixel.
         let found = error_of_filtered([&fa, &fb], [&a, &b], &scales);
@@ -96,8 +100,21 @@ mod tests {
         let [a, b] = [(), ()].map(|()| image(&(0..size * size).map(|_| pixel()).collect::<Vec<_>>()));
         let (truth, variance) = (f64::from(lamp * odds), f64::from(lamp * lamp * odds * (1.0 - odds)));
         let relative = variance / samples as f64 / (truth * truth + RELMSE_EPSILON);
-        let found = error([&a, &b], &scales(size, [&a, &b])) / relative;
+        let found = error([&a, &b], &scales(size, [&a, &b], [&a, &b])) / relative;
         assert!((0.5..2.0).contains(&found), "{found} of the true error");
+    }
+
+    /// One pixel of 20 in a row of black, whose noise is 5 and which a filter cuts to .3.
+    #[test]
+    fn the_error_of_a_small_lamp_is_relative_to_it() {
+        let row = |value: f32| image(&[0.0, 0.0, value, 0.0, 0.0]);
+        let ([a, b], [fa, fb]) = ([row(25.0), row(15.0)], [row(0.3), row(0.3)]);
+        let scales = scales(5, [&fa, &fb], [&a, &b]);
+        let found = error([&a, &b], &scales);
+        assert!((found - 50.0 / (375.0 + RELMSE_EPSILON) / 5.0).abs() < 1e-6, "{found}");
+        // Control: one that only one image shows is an outlier, and hides no error of its own.
+        let [one, none] = [row(25.0), row(0.0)];
+        assert!(error([&one, &none], &super::scales(5, [&fa, &fb], [&one, &none])) > 500.0);
     }
 
     #[test]

@@ -152,7 +152,7 @@ fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> 
         Target::RelMse(error) => (error, "an", "error"),
     };
     if !(value.is_finite() && value > 0.0) {
-        return Err(Error::Usage(format!("{article} {name} of {value}: give a number above 0")));
+        return Err(Error::Usage(format!("{article} {name} of {value}: give a finite number above 0")));
     }
     if settings.allocate.noise_threshold > 0.0 {
         let what = "a noise threshold ends a render by itself: give it, or a time or an error";

@@ -148,7 +148,7 @@ impl<'a> Probe<'a> {
         let width = self.renderer.settings().width as usize;
         let last = &pairs[pairs.len() - 1].1;
         let cleanest = last.each_ref().map(|image| &image.filtered.iter().flatten().next().unwrap_or(&image.noisy)[..]);
-        let scales = halves::scales(width, cleanest);
+        let scales = halves::scales(width, cleanest, last.each_ref().map(|image| &image.noisy[..]));
         let measured = |[a, b]: &[Image; 2], method: usize| {
             let noisy: [&Pixels; 2] = [&a.noisy, &b.noisy];
             let error = match (&a.filtered[method], &b.filtered[method]) {
