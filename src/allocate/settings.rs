@@ -29,7 +29,7 @@ settings! {
             max_spp: u32 = 0, 0..=Self::MAX_SPP;
             /// Rounds that the budget is spread over; 0: one, of policies that learn one for every 2 samples a pixel, up to 4.
             rounds: u32 = 0, 0..=4096;
-            /// Stop when every pixel's relative error is estimated below this, or at --max-spp (else --spp); 0 is off.
+            /// Stop when every pixel's relative error is estimated below this, or at --max-spp (else --spp); for variance and both; 0 is off.
             noise_threshold: f32 = 0.0, FINITE_FROM_0;
             ..geometry: GeometrySettings, GeometryOverrides, [serde(flatten)];
             ..variance: VarianceSettings, VarianceOverrides, [serde(flatten)];

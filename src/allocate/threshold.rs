@@ -11,7 +11,8 @@ use crate::shaders::threshold::Bind;
 /// The entry of this policy in [`super::POLICIES`].
 pub const ROW: Policy = Policy {
     name: "threshold",
-    about: "RAS as published: a sample a round where noise reaches a threshold that falls to 0 by --max-spp, then by chance",
+    about: "RAS as published: a sample a round where noise reaches a threshold that falls to 0 by --max-spp, then by chance; below \
+            --min-spp 16 it brightens",
     guides: false,
     split_light: false,
     placing: Placing::Chosen,
