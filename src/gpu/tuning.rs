@@ -56,6 +56,9 @@ pub struct Tuning {
     /// Threads in a workgroup of a filter that looks at pixels around its own, all in one row. In larger ones neighbours share
     /// more of what they read. With 128 in place of 32 an H200 takes .85 (`wavelet`), .97 (`svgf`) and .99 to 1.00 of the time.
     pub filter_workgroup: u32,
+    /// Bytes of a film's largest buffer, if the device allows as many. A film that takes more is kept in several, and can neither have
+    /// its samples placed, nor be filtered or reprojected. At least those of 64 pixels.
+    pub film_buffer_bytes: u64,
     /// Longest edge of a filtered image in pixels. Threads of some filters walk along a whole one, which drivers that run
     /// on a CPU may end early behind as many as [`Self::CPU`] has.
     pub longest_edge: u64,
@@ -77,6 +80,7 @@ impl Tuning {
         triangles_a_step: 0,
         wavefront: false,
         filter_workgroup: 32,
+        film_buffer_bytes: u64::MAX,
         longest_edge: 60_000,
     };
 
@@ -95,6 +99,7 @@ impl Tuning {
         triangles_a_step: 2,
         wavefront: true,
         filter_workgroup: 128,
+        film_buffer_bytes: u64::MAX,
         longest_edge: u64::MAX,
     };
 
@@ -111,6 +116,7 @@ impl Tuning {
             ("strip_bytes", self.strip_bytes),
             ("lines", self.lines.into()),
             ("filter_workgroup", self.filter_workgroup.into()),
+            ("film_buffer_bytes", self.film_buffer_bytes),
             ("longest_edge", self.longest_edge),
         ];
         match sizes.iter().find(|(_, size)| *size == 0) {

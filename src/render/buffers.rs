@@ -1,6 +1,6 @@
 //! The buffers of a render: the scene's, the film's, and what is in flight. `P` pixels, `B` paths in flight.
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, DeviceInfo, Gpu, Location, PART, thread_items};
+use crate::gpu::{Buffer, Gpu, Location, PART, thread_items};
 use crate::layout::*;
 use crate::render::pass::counts::Counts;
 use crate::render::schedule::Batch;
@@ -176,14 +176,16 @@ const _: () = assert!(size_of::<History>() as u64 <= WIDEST && size_of::<History
 const _: () = assert!(size_of::<History>().is_multiple_of(16) && size_of::<HistoryLight>().is_multiple_of(16));
 
 /// Pixels of the largest tile, whose records fit one buffer and one view of texels, and of a window.
-fn extents(info: &DeviceInfo) -> [u32; 2] {
+fn extents(gpu: &Gpu) -> [u32; 2] {
+    let info = gpu.info();
     let texels = info.max_texel_elements.saturating_mul(16);
-    whole_windows(info.max_allocation.min(info.max_buffer_size).min(texels), info.max_storage_range)
+    let buffer = info.max_allocation.min(info.max_buffer_size).min(texels);
+    whole_windows(buffer.min(gpu.tuning().film_buffer_bytes), info.max_storage_range)
 }
 
 /// Most pixels of a film that fits one tile.
-pub(super) fn most_of_one_tile(info: &DeviceInfo) -> u32 {
-    extents(info)[0]
+pub(super) fn most_of_one_tile(gpu: &Gpu) -> u32 {
+    extents(gpu)[0]
 }
 
 /// The same for bytes of a tile and of a storage binding.
@@ -318,7 +320,7 @@ impl FilmBuffers {
     /// [`Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, pixels: u32, paths: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let records = paths as usize * effects.records_per_path();
-        let [capacity, window] = extents(gpu.info());
+        let [capacity, window] = extents(gpu);
         let starts = (0..pixels).step_by(capacity as usize);
         let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), window, effects, guides);
         let placed = |n: u32| if effects.adaptive { n } else { 1 };

@@ -6,9 +6,10 @@ use tallow::denoise::filter::{FILTERS, FilterSettings, Method, Row};
 use tallow::denoise::{Demodulation, Denoiser, Noisy, Recipe, timed};
 use tallow::error::Error;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning};
-use tallow::layout::vec4;
+use tallow::image;
+use tallow::layout::{Guide, vec4};
 use tallow::render::settings::Settings;
-use tallow::render::{Counters, Outputs, Renderer};
+use tallow::render::{Counters, FilmTile, Job, Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
 
 /// All layers that a renderer keeps, and its counters.
@@ -138,6 +139,63 @@ fn switches_leave_the_bits_of_renders() {
         }
         assert_silent(&gpu);
     }
+}
+
+/// What [`film`] returns but for counters, of a film in so many buffers, with what the lens blurs and what is seen in smooth surfaces,
+/// and the channels of its file.
+fn film_of_tiles(gpu: &Gpu, scene: &Loaded, tiles: usize) -> (Vec<Vec<u32>>, image::Film) {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
+    let status = Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu).unwrap()).unwrap();
+    let film = &renderer.film().tiles;
+    assert_eq!(film.len(), tiles);
+    let all = |of: &dyn Fn(&FilmTile) -> Vec<u32>| film.iter().flat_map(of).collect::<Vec<_>>();
+    let layers = vec![
+        all(&|tile| bits(&tile.stats.read().unwrap()[..tile.pixels as usize])),
+        all(&|tile| bits(&tile.light.read().unwrap()[..tile.pixels as usize])),
+        all(&|tile| bits(&tile.guide.read().unwrap()[..tile.pixels as usize])),
+        all(&|tile| bits(&tile.seen.read().unwrap()[..tile.pixels as usize])),
+    ];
+    assert!(Noisy::of_film(&renderer).is_ok() == (tiles == 1));
+    (layers, Job::new(&renderer).film(&status).unwrap())
+}
+
+#[test]
+fn films_in_several_buffers_have_the_bits_of_one() {
+    // Of 64 pixels a guide: 2145 of them take 34, the last of which is cut.
+    let tuning = Tuning { film_buffer_bytes: 64 * size_of::<Guide>() as u64, ..Tuning::CPU };
+    let [one, many] = [Tuning::CPU, tuning].map(tuned_gpu);
+    for (size, tiles) in [([65, 33], 34), ([1, 65], 2), ([64, 1], 1)] {
+        let scene = scene("cornell-box/glass.toml", "uniform").with(|s| [s.width, s.height] = size);
+        let ((usual, whole), (divided, file)) = (film_of_tiles(&one, &scene, 1), film_of_tiles(&many, &scene, tiles));
+        assert!(usual == divided, "{size:?}");
+        let samples = |film: &image::Film| -> Vec<_> {
+            film.channels
+                .iter()
+                .map(|c| (c.name.clone(), (0..film.pixels()).map(|i| c.samples.at(i).to_bits()).collect::<Vec<_>>()))
+                .collect()
+        };
+        assert!(samples(&whole) == samples(&file), "{size:?}");
+    }
+    // Samples are placed in films of one buffer alone.
+    let placed = scene("cornell-box/glass.toml", "geometry");
+    let why = Renderer::new(&many, &placed, &placed.settings, OUTPUTS).err().map(|why| why.to_string());
+    assert!(why.as_ref().is_some_and(|why| why.contains("choose at most 64 pixels")), "{why:?}");
+    [one, many].iter().for_each(assert_silent);
+}
+
+/// The first sample that is no number is told by its pixel in the whole film.
+#[test]
+fn a_broken_sample_is_told_by_its_place_in_all_buffers() {
+    let gpu = tuned_gpu(Tuning { film_buffer_bytes: 64 * size_of::<Guide>() as u64, ..Tuning::CPU });
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/broken.toml");
+    let text = "[film]\nwidth = 21\nheight = 21\nfilter = 'point'\n[camera]\nposition = [0, 0, 2]\ntarget = [0, 0, 0]\n[render]\nspp = 4\n\
+        max_depth = 2\n[[mesh]]\nshape = 'rectangle'\n[[light]]\ntype = 'point'\nposition = [0, 0, 1e-5]\nintensity = [1e30, 1e30, 1e30]\n";
+    let scene = Scene::parse(&path, text).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
+    let status = Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
+    let broken = status.broken_samples.unwrap();
+    assert_eq!((broken.pixel, broken.sample, renderer.film().tiles.len()), ([10, 10], 0, 7));
+    assert_silent(&gpu);
 }
 
 /// Software devices end loops after 65,535 turns, and what is left of a pixel's samples would be lost: see

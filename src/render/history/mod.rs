@@ -135,9 +135,8 @@ impl History {
     /// # Errors
     /// [`Error::Usage`] for a film of too many pixels.
     pub(super) fn check_room(gpu: &Gpu, pixels: u32) -> Result<()> {
-        let info = gpu.info();
-        let words = info.max_storage_range / size_of::<u32>() as u64;
-        let most = words.min(MOST_PIXELS.min(most_of_one_tile(info)).into());
+        let words = gpu.info().max_storage_range / size_of::<u32>() as u64;
+        let most = words.min(MOST_PIXELS.min(most_of_one_tile(gpu)).into());
         if u64::from(pixels) > most {
             return Err(Error::Usage(format!(
                 "a film of {pixels} pixels is too large to reproject on this device: choose at most {most} pixels"
