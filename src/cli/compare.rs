@@ -68,6 +68,16 @@ struct Limits {
 /// Bytes per pixel that the metrics take in addition to the two pictures; 118 were measured at 1024 x 1024.
 const BYTES_PER_PIXEL: u64 = 125;
 
+/// Share of the pixels in which the metrics of what is shown may miss a difference before that is told.
+const UNSEEN: f64 = 0.5;
+
+fn words_of_unseen(share: f64) -> String {
+    format!(
+        "{:.0} % of the pixels differ beyond 0 and 1, where PSNR, SSIM and FLIP see nothing: go by MSE and relMSE",
+        100.0 * share
+    )
+}
+
 /// Runs the subcommand.
 ///
 /// # Errors
@@ -84,6 +94,11 @@ pub fn run(args: &Args) -> Result<Exit> {
     let (a, b) = (load(&args.a)?, load(&args.b)?);
     check_sizes((&args.a, a.size()), (&args.b, b.size()))?;
     image::check_memory(&args.a, a.pixels.len() as u64 * BYTES_PER_PIXEL)?;
+    let unseen = metrics::unseen(&a, &b);
+    if unseen > UNSEEN {
+        args.limits.check_seen(unseen)?;
+        complain(&format!("warning: {}", words_of_unseen(unseen)));
+    }
     let metrics = metrics::compare(&a, &b);
     let exceeded = args.limits.exceeded(&metrics)?;
     let scale = args.diff.as_ref().map(|path| write_diff(path, &a, &b)).transpose()?;
@@ -139,6 +154,17 @@ pub fn values(m: &Metrics) -> [String; 5] {
 }
 
 impl Limits {
+    /// Limits of what is shown say nothing where it shows next to nothing.
+    fn check_seen(&self, unseen: f64) -> Result<()> {
+        let of_shown = [("max-flip", self.max_flip), ("min-psnr", self.min_psnr), ("min-ssim", self.min_ssim)];
+        match of_shown.iter().find(|(_, limit)| limit.is_some()) {
+            Some((option, _)) => {
+                Err(Error::Usage(format!("--{option}: {}, as by --max-mse and --max-relmse", words_of_unseen(unseen))))
+            }
+            None => Ok(()),
+        }
+    }
+
     fn exceeded(&self, m: &Metrics) -> Result<Vec<String>> {
         if self.min_ssim.is_some() && m.ssim.is_none() {
             return Err(Error::Usage("--min-ssim needs images of at least 11x11 pixels".to_owned()));

@@ -34,7 +34,7 @@ Exit codes:
   3    input: a file cannot be read or is damaged
   4    device or memory: no Vulkan, no usable device, it was lost, or memory is out
   5    output: a file cannot be written
-  6    some points of a measurement, or frames of a sequence, failed; the others are written
+  6    some points of a measurement, or frames of a sequence, failed, and the others are written; or nothing could be measured in its time
   7    too noisy to say: compare --statistical finds no difference, but could have missed one, or profiles are of other devices or clocks
   70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
@@ -143,7 +143,7 @@ fn usage(e: &clap::Error, words: &[OsString]) -> Result<Exit> {
     // Of an option that needs another one only the usage says the name.
     let tells = |p: &String| match e.kind() {
         ErrorKind::MissingRequiredArgument => !p.starts_with("For more"),
-        _ => !p.starts_with("Usage:") && !p.starts_with("For more"),
+        _ => !["Usage:", "For more", "tip: to pass"].iter().any(|words| p.starts_with(words)),
     };
     let parts = text.split("\n\n").map(one_line).filter(tells);
     let message = parts.collect::<Vec<_>>().join("; ");

@@ -34,6 +34,18 @@ pub fn compare(test: &Picture, reference: &Picture) -> Metrics {
     Metrics { mse, relmse, psnr, ssim, flip }
 }
 
+/// Share of the pixels that differ while what is shown of them does not: both lie beyond 0 or 1, where PSNR, SSIM and FLIP see nothing.
+///
+/// # Panics
+/// When their sizes differ.
+pub fn unseen(test: &Picture, reference: &Picture) -> f64 {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    let beyond = |a: f32, b: f32| a == b || (a <= 0.0 && b <= 0.0) || (a >= 1.0 && b >= 1.0);
+    let is_unseen = |(a, b): &(&[f32; 3], &[f32; 3])| a != b && (0..3).all(|c| beyond(a[c], b[c]));
+    let count = test.pixels.iter().zip(&reference.pixels).filter(is_unseen).count();
+    count as f64 / test.pixels.len().max(1) as f64
+}
+
 /// The picture as it is shown: sRGB-encoded and clamped to [0, 1].
 fn shown(picture: &Picture) -> Picture {
     let pixels = picture.pixels.iter().map(|pixel| pixel.map(srgb_from_linear)).collect();

@@ -1,8 +1,8 @@
 //! Tests the built program's exit codes, and that errors are one readable line.
-use crate::command::{complains, stdout, tallow};
+use crate::command::{complains, names, stdout, tallow};
 use crate::flat;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use tallow::image::{self, Film, WriteOptions};
 use tempfile::TempDir;
@@ -176,6 +176,38 @@ fn colours_are_those_of_rec_709_whatever_primaries_a_file_names() {
     assert_eq!(stored.status.code(), Some(0), "numbers stay");
 }
 
+/// Depths of 5 and 6 are white in both pictures.
+#[test]
+fn metrics_of_what_is_shown_judge_nothing_that_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, depths: [f32; 2]| {
+        let mut film = Film::new(12, 12);
+        film.add_vec3("", ["R", "G", "B"], &[[0.5; 3]; 144]);
+        let depth = (0..144).map(|i| depths[usize::from(i >= 60)]).collect();
+        film.add("Z", image::Samples::F32(depth));
+        image::write(&folder.path().join(name), &film, &WriteOptions::default()).unwrap();
+    };
+    file("a.exr", [0.25, 5.0]);
+    file("b.exr", [0.25, 6.0]);
+    file("c.exr", [0.25, 0.5]);
+    file("d.exr", [0.25, 0.5 + f32::EPSILON]); // of which 8 bits show nothing either
+    let compare = |files: [&str; 2], words: &str| {
+        tallow(&folder, &[&["compare"], &files[..], &words.split_whitespace().collect::<Vec<_>>()].concat())
+    };
+    complains(&compare(["a.exr", "b.exr"], "--layer Z"), 0, &["58 % of the pixels differ beyond 0 and 1"]);
+    complains(&compare(["a.exr", "b.exr"], "--layer Z --max-flip 1"), 2, &["--max-flip", "by --max-mse"]);
+    complains(&compare(["a.exr", "b.exr"], "--layer Z --min-psnr 1"), 2, &["--min-psnr", "58 %"]);
+    let told = compare(["a.exr", "b.exr"], "--layer Z --max-mse 0.1");
+    assert_eq!((told.status.code(), String::from_utf8(told.stderr).unwrap().lines().count()), (Some(1), 2));
+    // What is shown, or the same, is judged.
+    for words in ["--max-flip 1", "--layer Z --max-flip 1"] {
+        let output = compare(["a.exr", if words.contains('Z') { "c.exr" } else { "b.exr" }], words);
+        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    }
+    assert!(compare(["a.exr", "a.exr"], "--layer Z --min-psnr 99").stderr.is_empty());
+    assert!(compare(["c.exr", "d.exr"], "--layer Z --min-psnr 99").status.success());
+}
+
 #[test]
 fn a_file_without_colour_is_told_which_option_names_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -337,14 +369,6 @@ fn full_disk(folder: &TempDir) {
     let mut to_full = Command::new("sh");
     to_full.args(["-c", "exec \"$0\" compare a.exr a.exr > /dev/full", env!("CARGO_BIN_EXE_tallow")]);
     complains(&to_full.current_dir(folder.path()).output().unwrap(), 5, &["standard output"]);
-}
-
-#[cfg(target_os = "linux")]
-fn names(folder: &Path) -> Vec<String> {
-    let entry = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
-    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(entry).collect();
-    names.sort();
-    names
 }
 
 /// The process has so many KiB of addresses: what asks for more ends in an abort, unless it is told before.

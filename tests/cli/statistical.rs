@@ -1,6 +1,6 @@
 //! Tests `tallow compare --statistical`: verdicts, exit codes and files.
 use crate::REC2020;
-use crate::command::{complains, stdout, tallow};
+use crate::command::{complains, names, stdout, tallow};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -217,6 +217,13 @@ fn one_percent_of_one_material_is_found_and_its_pixels_render_again_to_the_same_
     assert!(error < 0.004 && (difference - 0.01).abs() < 3.0 * error, "{worst}");
     assert_eq!(std::fs::read_dir(folder.path().join("nothing")).unwrap().count(), 0, "they are the same");
     replayed(&folder);
+    // What shows that others were not is gone once they are; what is not of a comparison stays.
+    std::fs::write(folder.path().join("found/notes.txt"), "mine").unwrap();
+    assert_eq!(compare(&folder, "c.exr b.exr --evidence found").status.code(), Some(0));
+    assert_eq!(names(&folder.path().join("found")), ["notes.txt"]);
+    std::fs::write(folder.path().join("nothing/report.json"), "{}").unwrap();
+    assert_eq!(compare(&folder, "c.exr b.exr --evidence nothing").status.code(), Some(0));
+    assert_eq!(names(&folder.path().join("nothing")), ["report.json"]);
 }
 
 /// Runs the first command of the evidence.

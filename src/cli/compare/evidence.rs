@@ -6,7 +6,7 @@ use crate::cli::files::key;
 use crate::error::{Error, Result};
 use crate::image::output;
 use crate::image::significance::{Finding, suspects};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -64,6 +64,26 @@ pub fn write(folder: &Path, report: &Report) -> Result<()> {
     let text = serde_json::to_string_pretty(&figures).map_err(|e| Error::output(folder, e))?;
     output::write(&folder.join("report.json"), text.as_bytes())?;
     output::write(&folder.join("replay.sh"), script(report, &pixels).as_bytes())
+}
+
+/// Removes what [`write`] made of an earlier comparison: these images are the same, and whoever takes up the folder would find that
+/// others were not. A folder without a report stays as it is.
+///
+/// # Errors
+/// [`Error::Output`].
+pub fn clear(folder: &Path, images: [&Path; 2]) -> Result<()> {
+    let report = folder.join("report.json");
+    let told = std::fs::read(&report).ok().and_then(|text| serde_json::from_slice::<Value>(&text).ok());
+    if !told.is_some_and(|told| told.get("verdict").is_some() && told.get("pixels").is_some()) {
+        return Ok(());
+    }
+    let gone = |path: &PathBuf| match std::fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(Error::output(path, format!("is of an earlier comparison, and cannot be removed: {e}")))
+        }
+        _ => Ok(()),
+    };
+    files(folder, images).iter().try_for_each(gone)
 }
 
 /// Copies a file as it is, since only the bytes themselves hold everything.

@@ -46,7 +46,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", requires = "statistical")]
     junit: Option<PathBuf>,
     /// Unless the images are the same, write them, the map, the page, all figures and commands that render the worst pixels
-    /// again to this folder
+    /// again to this folder; what an earlier comparison left there goes once they are
     #[arg(long, value_name = "FOLDER", requires = "statistical")]
     evidence: Option<PathBuf>,
 }
@@ -79,8 +79,10 @@ pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
         output::write(path, page::html(&report).as_bytes())?;
     }
     let failed = failed(&report);
-    if let Some(folder) = args.evidence.as_ref().filter(|_| failed) {
-        evidence::write(folder, &report)?;
+    match &args.evidence {
+        Some(folder) if failed => evidence::write(folder, &report)?,
+        Some(folder) => evidence::clear(folder, [a, b])?,
+        None => {}
     }
     if json {
         print_json(&summary(&report, args, full))?;
