@@ -298,10 +298,11 @@ fn samples_of_head(film: &Film, colour: &str) -> Option<f32> {
     told.filter_map(|key| film.metadata.get(&key)?.parse().ok()).find(|n: &f32| n.is_finite() && *n > 0.0)
 }
 
-/// Finds a layer in the view layer of the colour, or else anywhere.
+/// Finds a layer in the view layer of the colour, or else anywhere but in another with a colour of its own.
 fn find<'a>(film: &'a Film, view: &str, name: &str) -> Option<[&'a Channel; 3]> {
     let own = (!view.is_empty()).then(|| film.find(Some(&format!("{view}.{name}")))).flatten();
-    own.or_else(|| film.find(Some(name)))
+    let elsewhere = || film.find(Some(name)).filter(|found| !film.is_other_view(split(&found[0].name).0, view));
+    own.or_else(elsewhere)
 }
 
 /// A number of samples; all else is the name of a layer.
@@ -375,6 +376,30 @@ mod tests {
         );
         let depth = [(Aov::Normal, 4.0), (Aov::Position, 7.0), (Aov::Depth, 3.0), (Aov::ShareOfSamples, 13.0)];
         assert_eq!(found(&file), [&[(Aov::Colour, 0.0), (Aov::Albedo, 10.0)], &depth[..]].concat());
+    }
+
+    #[test]
+    fn of_several_view_layers_one_is_named_and_takes_nothing_from_the_others() {
+        let mut file = film(
+            "A.Combined.R A.Combined.G A.Combined.B B.Combined.R B.Combined.G B.Combined.B B.Denoising_Albedo.R \
+             B.Denoising_Albedo.G B.Denoising_Albedo.B B.Denoising_Normal.X B.Denoising_Normal.Y B.Denoising_Normal.Z \
+             Other.Depth.Z",
+        );
+        let why = Aovs::find(&file, &Names::new()).map(|_| ()).unwrap_err();
+        assert_eq!(why, "holds several pictures: A.Combined, B.Combined");
+        let named = |name: &str| {
+            let names = Names::from([(Aov::Colour, name.to_owned())]);
+            let aovs = Aovs::find(&file, &names).unwrap();
+            [Aov::Colour, Aov::Albedo, Aov::Normal, Aov::Depth].map(|aov| aovs.scalar(aov, 0))
+        };
+        assert_eq!(named("A.Combined"), [Some(0.0), None, None, Some(12.0)]);
+        assert_eq!(named("B.Combined"), [Some(3.0), Some(6.0), Some(9.0), Some(12.0)]);
+        // What a compositor made of one, or a root beside it, is a picture with that one's layers.
+        file.channels.drain(..3);
+        ["R", "G", "B"].iter().for_each(|name| file.add(*name, Samples::F32(vec![20.0])));
+        assert_eq!(found(&file)[..2], [(Aov::Colour, 20.0), (Aov::Albedo, 6.0)]);
+        file.channels.iter_mut().rev().take(3).for_each(|c| c.name = format!("Composite.Combined.{}", c.name));
+        assert_eq!(found(&file)[..2], [(Aov::Colour, 20.0), (Aov::Albedo, 6.0)]);
     }
 
     #[test]

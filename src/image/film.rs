@@ -182,7 +182,7 @@ impl Film {
     /// Returns three values per pixel of one layer: its R, G, B or X, Y, Z, or its only channel three times.
     ///
     /// Without a name, the layer is the colour: the channels R, G, B, or a layer that other programs use for it
-    /// (`ViewLayer.Combined`, `rgba`), or the only layer with R, G, B, or grey (Y). A name matches in full or by its last part,
+    /// (`ViewLayer.Combined`, `rgba`) once, or the only layer with R, G, B, or grey (Y). A name matches in full or by its last part,
     /// regardless of case; `RGB` are the channels R, G, B where no layer is called so.
     ///
     /// # Errors
@@ -224,26 +224,51 @@ impl Film {
     }
 
     pub(super) fn no_such_layer(&self, layer: Option<&str>) -> String {
+        if let (None, [_, _, ..]) = (layer, &self.pictures()[..]) {
+            return format!("holds several pictures: {}", self.pictures().join(", "));
+        }
         let wanted = layer.map_or("no colour (R, G, B)".to_owned(), |name| format!("no single layer {name:?}"));
         let names: Vec<_> = self.channels.iter().map(|c| c.name.as_str()).collect();
         format!("holds {wanted}; its channels are {}", names.join(", "))
     }
 
     fn colour(&self) -> Option<[&Channel; 3]> {
-        // Those behind "color" are Karma's, RenderMan's and LuxCore's.
-        const USUAL: [&str; 9] = ["", "combined", "beauty", "rgba", "rgb", "color", "c", "ci", "rgb_imagepipeline"];
-        let coloured: Vec<_> =
-            self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some()).collect();
-        let usual = |l: &&&str| {
-            let name = l.to_lowercase();
-            USUAL.contains(&split(name.strip_suffix(".main").unwrap_or(&name)).1) // Nuke names parts `rgba.main`
-        };
+        let coloured: Vec<_> = self.coloured().collect();
         let clean = |l: &&&str| !split(l).1.eq_ignore_ascii_case(NOISY);
         let only = || coloured.iter().find(clean).filter(|_| coloured.iter().filter(clean).count() == 1);
-        match coloured.iter().find(usual).or_else(only) {
-            Some(layer) => self.triple(layer, ["R", "G", "B"]),
-            None => self.grey(|c| c.name == "Y"),
+        match self.pictures()[..] {
+            [_, _, ..] => None,
+            [layer] => self.triple(layer, ["R", "G", "B"]),
+            [] => match only() {
+                Some(layer) => self.triple(layer, ["R", "G", "B"]),
+                None => self.grey(|c| c.name == "Y"),
+            },
         }
+    }
+
+    fn coloured(&self) -> impl Iterator<Item = &str> {
+        self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some())
+    }
+
+    /// The layer of the colour, by one of the names that programs give it; several where the view layers of a file have one of the same
+    /// name each.
+    fn pictures(&self) -> Vec<&str> {
+        let usual = || self.coloured().filter(|layer| is_usual(layer));
+        if let Some(composite) = usual().find(|layer| is_composite(split(layer).0)) {
+            return vec![composite];
+        }
+        let Some(first) = usual().next() else { return Vec::new() };
+        let same = |layer: &&str| split(layer).1.eq_ignore_ascii_case(split(first).1);
+        let others = usual().filter(|layer| *layer != first).filter(same);
+        let others = others.filter(|_| !first.is_empty() && !first.to_lowercase().ends_with(".main"));
+        [first].into_iter().chain(others).collect()
+    }
+
+    /// Whether `layer` is of another view layer than `view`, where several have colours of their own, as Blender's have.
+    pub(super) fn is_other_view(&self, layer: &str, view: &str) -> bool {
+        let (own, pictures) = (split(layer).0, self.coloured().filter(|layer| is_usual(layer)));
+        let views: BTreeSet<_> = pictures.map(|layer| split(layer).0).filter(|view| !view.is_empty()).collect();
+        own != view && views.contains(own) && views.iter().filter(|view| !is_composite(view)).count() > 1
     }
 
     fn layer(&self, wanted: &str) -> Option<[&Channel; 3]> {
@@ -329,6 +354,19 @@ impl Samples {
             Self::U32(v) => v.iter().map(|&u| u as f32).collect(),
         }
     }
+}
+
+/// What Blender's compositor makes of all view layers.
+fn is_composite(view: &str) -> bool {
+    view.eq_ignore_ascii_case("composite")
+}
+
+/// Whether programs call the layer of the colour so.
+fn is_usual(layer: &str) -> bool {
+    // Those behind "color" are Karma's, RenderMan's and LuxCore's.
+    const USUAL: [&str; 9] = ["", "combined", "beauty", "rgba", "rgb", "color", "c", "ci", "rgb_imagepipeline"];
+    let name = layer.to_lowercase();
+    USUAL.contains(&split(name.strip_suffix(".main").unwrap_or(&name)).1) // Nuke names parts `rgba.main`
 }
 
 /// Layer and component of a channel name: `a.b.R` is (`a.b`, `R`), `Z` is (``, `Z`).
