@@ -86,6 +86,9 @@ fn measured(
     ];
     let inputs: Vec<_> = inputs.iter().filter_map(|(name, path)| Some((*name, path.as_deref()?))).collect();
     let folder = Folder::open(&args.output, &inputs)?;
+    if let Some(subject) = args.scene.as_deref().or(args.filter_only.as_deref()) {
+        folder.check_subject(&scene_name(subject).to_string_lossy())?;
+    }
     let earlier = folder.earlier(key);
     let runs_before = earlier.as_ref().map_or(0, runs);
     let stop = interrupt::flag();
@@ -130,6 +133,12 @@ fn finish(
             Ok(Exit::Interrupted)
         }
         _ if document.points.iter().any(|point| point.failed.is_some()) => Ok(Exit::PartlyFailed),
+        Ended::Budget if runs(document) == 0 => {
+            complain(
+                "nothing could be measured within --budget-minutes: give more, or choose a smaller film or fewer points",
+            );
+            Ok(Exit::PartlyFailed)
+        }
         Ended::Budget | Ended::Complete => Ok(Exit::Done),
     }
 }

@@ -4,7 +4,7 @@ use super::judge::Noise;
 use crate::error::{Error, Result};
 use crate::image::aov::{Aovs, Names};
 use crate::image::metrics;
-use crate::image::{self, Film, Picture};
+use crate::image::{self, FILTERED, Film, Picture};
 use crate::render::provenance::{self, Provenance};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -43,7 +43,16 @@ pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings)>) -> 
         provenance.shows(scene, settings).map_err(|what| wrong(format!("{what}: it is no reference for that")))?;
         notes.extend(differences(&provenance.settings, settings));
     }
-    let bound = bound(&film, &picture);
+    let filter = film.metadata.get(FILTERED);
+    notes.extend(filter.map(|filter| {
+        format!("the reference was filtered ({filter}): errors are from what that made of it, and what its own is worth is not known")
+    }));
+    if image::input::holds_integers(path) {
+        let what =
+            "the reference has no floats, as an image to look at: what is brighter than 1 was cut, and counts as error";
+        notes.push(what.to_owned());
+    }
+    let bound = bound(&film, &picture).filter(|_| filter.is_none());
     Ok(Reference {
         noise: Noise::default(),
         info: ReferenceInfo {
@@ -90,6 +99,29 @@ fn differences(of_file: &serde_json::Value, settings: &Settings) -> Vec<String> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What a filter or eight bits have taken from it is told, and no noise is claimed of what was filtered.
+    #[test]
+    fn references_that_are_worth_less_than_they_look_are_told_of() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut film = Film::new(2, 1);
+        film.add_vec3("", ["R", "G", "B"], &[[0.5; 3]; 2]);
+        film.add_vec3("variance", ["R", "G", "B"], &[[0.01; 3]; 2]);
+        let told = |name: &str, film: &Film| {
+            let path = folder.path().join(name);
+            image::write(&path, film, &Default::default()).unwrap();
+            let ReferenceInfo { noise, notes, .. } = read(&path, [2, 1], None).unwrap().info;
+            (noise == NoiseKind::Bound, notes)
+        };
+        assert_eq!([told("a.exr", &film), told("a.hdr", &film)], [(true, vec![]), (false, vec![])]);
+        std::fs::copy(folder.path().join("a.exr"), folder.path().join("b.dat")).unwrap();
+        assert_eq!(read(&folder.path().join("b.dat"), [2, 1], None).unwrap().info.notes, [""; 0]);
+        let (_, notes) = told("a.png", &film);
+        assert!(notes.len() == 1 && notes[0].contains("has no floats"), "{notes:?}");
+        film.metadata.insert(FILTERED.to_owned(), "auto".to_owned());
+        let (bound, notes) = told("a.exr", &film);
+        assert!(!bound && notes.len() == 1 && notes[0].contains("was filtered (auto)"), "{notes:?}");
+    }
 
     #[test]
     fn a_file_of_the_same_settings_differs_in_none() {

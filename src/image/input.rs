@@ -50,6 +50,12 @@ pub fn is_of_another_format(path: &Path) -> bool {
     others && head().is_ok_and(|head| !super::is_image(&head))
 }
 
+/// Whether an image holds integers, by its first bytes; false for what cannot be read.
+pub fn holds_integers(path: &Path) -> bool {
+    let head = || File::open(path).and_then(|mut file| head(&mut file));
+    head().is_ok_and(|head| !super::holds_floats(&head))
+}
+
 fn head(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
     file.take(HEAD as u64).read_to_end(&mut head)?;

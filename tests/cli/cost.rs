@@ -2,8 +2,8 @@
 //! does when it is interrupted or when points fail.
 #![cfg(target_os = "linux")]
 use crate::REC2020;
-use crate::child::{Running, command, scene};
-use crate::command::complains;
+use crate::child::{Running, command};
+use crate::command::{complains, scene};
 use etcetera::BaseStrategy;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -206,7 +206,9 @@ fn what_is_missing_is_completed_and_nothing_else_is_measured_again() {
     assert!(all_runs(&finished) == all_runs(&again));
     // Another measurement begins anew, and does not replace a whole one by a part.
     let other = "--allocate uniform --denoise none --spp 1,2 --repeats 4 -o all --budget-minutes 0.000001";
-    let printed = text(&cost(&folder, other), 0);
+    let output = cost(&folder, other);
+    let printed = text(&output, 6);
+    complains(&output, 6, &["nothing could be measured within --budget-minutes"]);
     assert!(printed.contains("not complete: 8 runs are missing") && printed.contains("cost.partial.json"), "{printed}");
     assert_eq!(document(&folder, "all/cost.json"), finished);
 }
@@ -220,7 +222,7 @@ fn a_reference_that_was_replaced_begins_another_measurement() {
     };
     let key = |name: &str| {
         let grid = "--allocate uniform --denoise none --spp 1 --reference clean.hdr --budget-minutes 0.000001 --quiet";
-        text(&cost(&folder, &format!("{grid} -o {name}")), 0);
+        text(&cost(&folder, &format!("{grid} -o {name}")), 6);
         document(&folder, &format!("{name}/cost.json")).measurement.key
     };
     render(1);

@@ -23,6 +23,8 @@ pub struct Folder {
     files: RefCell<Files>,
     /// Documents that were not complete, with their files.
     begun: Vec<(PathBuf, Document)>,
+    /// The name of what the one was of that is complete.
+    of: Option<String>,
 }
 
 impl Folder {
@@ -37,14 +39,30 @@ impl Folder {
         std::fs::create_dir_all(path).map_err(|e| Error::output(path, format!("cannot be made: {e}")))?;
         NAMES.iter().try_for_each(|name| output::check(&path.join(name)))?;
         let json = path.join(NAMES[0]);
-        let mut begun = Vec::new();
+        let (mut begun, mut of) = (Vec::new(), None);
         for file in std::iter::once(json.clone()).chain(partial_files(&json)).filter(|file| file.exists()) {
             let document = read(&file)?;
-            if !document.complete {
-                begun.push((file, document));
+            match document.complete {
+                true if file == json => of = Some(document.scene.name),
+                true => {}
+                false => begun.push((file, document)),
             }
         }
-        Ok(Self { path: path.to_owned(), files: RefCell::default(), begun })
+        Ok(Self { path: path.to_owned(), files: RefCell::default(), begun, of })
+    }
+
+    /// Checks that a complete measurement there is not of a scene or image of another name: it would be replaced.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check_subject(&self, name: &str) -> Result<()> {
+        match &self.of {
+            Some(other) if other != name => Err(Error::Usage(format!(
+                "{} holds what was measured of \"{other}\", which \"{name}\" would replace: choose another folder with -o",
+                self.path.display()
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// A measurement of this key that is not complete yet, of several the one with most runs. It goes on in its files.
@@ -335,6 +353,23 @@ mod tests {
         open.write(&Document { complete: true, ..more }, &pictures, true);
         assert!(!files[2].exists() && files[0].exists() && files[1].exists(), "only its own are removed");
         assert_eq!(of(&inside("cost.json")), "third");
+    }
+
+    /// Once it is complete; what was begun goes on beside it.
+    #[test]
+    fn what_was_measured_of_one_scene_is_not_replaced_by_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let pictures =
+            Images { reference: Picture { width: 1, height: 1, pixels: vec![[0.0; 3]] }, points: Vec::new() };
+        let mut of_a = document("a");
+        of_a.scene.name = "a".to_owned();
+        let open = || Folder::open(folder.path(), &[]).unwrap();
+        open().write(&of_a, &pictures, false);
+        assert!(open().check_subject("b").is_ok(), "it is not complete");
+        open().write(&Document { complete: true, ..of_a.clone() }, &pictures, true);
+        assert!(open().check_subject("a").is_ok());
+        let why = open().check_subject("b").unwrap_err().to_string();
+        assert!(why.contains("holds what was measured of \"a\", which \"b\" would replace"), "{why}");
     }
 
     /// One that was killed before it had a table and a page takes none of another.
