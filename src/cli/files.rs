@@ -4,6 +4,7 @@ use super::interrupt;
 use crate::error::{Error, Result};
 use crate::image::output::{self, Stream};
 use crate::image::{self, Film, WriteOptions};
+use crate::scene::Scene;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -213,6 +214,28 @@ pub fn check_distinct(outputs: &[(&str, &Path)], inputs: &[(&str, &Path)]) -> Re
         if let Some((other, _)) = others.into_iter().find(|(_, taken)| key(taken) == key(path)) {
             let path = path.display();
             return Err(Error::Usage(format!("{option} {path} is the same file as {other}: choose another name")));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that none of the outputs, given by their options, is a file that the scene is made of, to be lost with all later renders.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn check_not_of_scene(outputs: &[(String, PathBuf)], scene: &Scene) -> Result<()> {
+    let existing: Vec<_> = outputs.iter().filter(|(_, path)| path.exists() && !output::is_special(path)).collect();
+    if existing.is_empty() {
+        return Ok(());
+    }
+    let files: BTreeMap<_, _> = scene.files.iter().map(|file| (key(file), file)).collect();
+    for (option, path) in existing {
+        if let Some(file) = files.get(&key(path)) {
+            let remedy = if option.starts_with('-') { option } else { "-o" };
+            let (path, file) = (path.display(), file.display());
+            return Err(Error::Usage(format!(
+                "{option} {path} would replace {file}, of which the scene is made: choose another name with {remedy}"
+            )));
         }
     }
     Ok(())

@@ -1,5 +1,5 @@
 //! `tallow merge`: combines renders of the same picture with different samples into one.
-use super::{Exit, complain};
+use super::{Exit, complain, quoted};
 use crate::error::{Error, Result};
 use crate::image::{self, WriteOptions};
 use crate::render::{self, Gap, Merged};
@@ -31,10 +31,16 @@ pub fn run(args: &Args) -> Result<Exit> {
         let name = args.output.display();
         return Err(Error::Usage(format!("{name}: a merged render keeps all of its layers: choose a name with .exr")));
     }
-    let Merged { film, gaps } = render::merge(&args.files)?;
+    let Merged { film, gaps, filtered } = render::merge(&args.files)?;
     image::write(&args.output, &film, &WriteOptions::default())?;
     for Gap { seed, first, last } in gaps {
         complain(&format!("warning: samples {first} to {last} of seed {seed} are missing"));
+    }
+    if let Some((part, filter)) = filtered.first() {
+        let (part, output) = (part.display(), quoted(&args.output.display().to_string()));
+        complain(&format!(
+            "note: {part} was filtered ({filter}), and the merged picture is not: tallow filter {output} --filter {filter} -o {output}"
+        ));
     }
     Ok(Exit::Done)
 }

@@ -13,7 +13,7 @@ use crate::image::output;
 use crate::profile::{Comparison, Profile, Verdict};
 use fresh::Fresh;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Show where the time of a frame goes, and what changed since an earlier profile
 ///
@@ -104,6 +104,12 @@ impl Args {
         self.scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"))
     }
 
+    /// What is written, by its option.
+    fn outputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let csv = self.csv.iter().map(|path| ("--csv", path.as_path()));
+        csv.chain(self.trace.iter().map(|path| ("--trace", path.as_path())))
+    }
+
     /// Whether an option is given that only frames which run now can follow.
     fn says_how_to_render(&self) -> bool {
         let Self { frames, denoise, common: Common { device, validation, .. }, tracing, overrides, .. } = self;
@@ -124,8 +130,7 @@ fn check_outputs(args: &Args) -> Result<()> {
             args.scene.display()
         )));
     }
-    let csv = args.csv.iter().map(|path| ("--csv", path.as_path()));
-    let outputs: Vec<_> = csv.chain(args.trace.iter().map(|path| ("--trace", path.as_path()))).collect();
+    let outputs: Vec<_> = args.outputs().collect();
     outputs.iter().try_for_each(|(_, path)| output::check(path))?;
     let compare = args.compare.iter().map(|path| ("--compare", path.as_path()));
     let inputs: Vec<_> = [("the scene", args.scene.as_path())].into_iter().chain(compare).collect();

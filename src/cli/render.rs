@@ -142,10 +142,17 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut host = Spans::default();
     let plan = planned::read(args)?;
     let (scene, settings) = host.time("load scene", || load(args))?;
+    outputs::check_with(args, &scene)?;
     let asked = settings.clone();
     let settings = plan.as_ref().map_or(Ok(settings), |plan| planned::settings(args, plan, &scene))?;
     let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
     args.common.warn(&scene.warnings);
+    let filtered = earlier.as_ref().and_then(|earlier| earlier.filtered.as_ref());
+    if let Some(filter) = filtered.filter(|_| args.denoise.is_none_or(Method::is_none)) {
+        args.common.warn(&[format!(
+            "the resumed image was filtered ({filter}), and this one will not be: add --denoise {filter}"
+        )]);
+    }
     let gpu = host.time("open device", || args.common.open(args.tracing))?;
     let plan = match plan {
         Some(plan) => Some(plan),
@@ -298,6 +305,20 @@ mod tests {
         assert_eq!(parse(&["room.toml", "-o", "a.png", "-o", "b.exr"]).output_files().len(), 2);
         assert_eq!(parse(&["room.v2.obj"]).output_files(), [Path::new("room.v2.exr")]);
         assert_eq!(parse(&["room.toml", "--exposure=-1.5"]).png.write_options().exposure, -1.5);
+    }
+
+    #[test]
+    fn options_of_the_scene_and_of_pictures_reach_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.gltf");
+        std::fs::write(&file, r#"{ "asset": { "version": "2.0" }, "scenes": [{}] }"#).unwrap();
+        let file = file.to_str().unwrap();
+        assert!(load(&parse(&[file])).is_ok());
+        let refused = |words: &[&str]| load(&parse(&[&[file], words].concat())).map(drop).unwrap_err().to_string();
+        assert!(refused(&["--clip", "walk"]).contains("walk") && refused(&["--camera", "left"]).contains("left"));
+        assert_eq!(parse(&["a.toml", "--tonemap", "aces"]).png.write_options().tone_map, image::tone::ToneMap::Aces);
+        let counted = |words: &[&str]| parse(&[&["a.toml"], words].concat()).wanted().counters;
+        assert_eq!([counted(&["--counters"]), counted(&[])], [true, false]);
     }
 
     #[test]

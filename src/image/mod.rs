@@ -21,7 +21,7 @@ pub use claim::Claim;
 pub use film::{Channel, FILTERED, Film, NOISY, Picture, SOFTWARE, Samples, Window};
 use frame::Frame;
 use output::Stream;
-pub(crate) use photo::{BAND, NO_IMAGE, bands, check_end, has_16_bits, picture};
+pub(crate) use photo::{BAND, NO_IMAGE, bands, check_end, has_16_bits, is_unread, picture};
 #[cfg(feature = "cli")]
 pub(crate) use photo::{codes, encode_png};
 use std::cell::Cell;

@@ -136,6 +136,11 @@ fn is_read(format: ImageFormat) -> bool {
     matches!(format, Png | Jpeg | Hdr | OpenExr | Tga | Bmp)
 }
 
+/// Whether the first bytes are those of a picture of another format.
+pub fn is_unread(bytes: &[u8]) -> bool {
+    format(bytes).is_none() && image::guess_format(bytes).is_ok()
+}
+
 /// Number of bytes from which the format is told.
 pub const HEAD: usize = 18;
 

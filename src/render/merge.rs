@@ -3,10 +3,10 @@ use super::film;
 use super::provenance::{self, Provenance, SampleRange};
 use super::rendered::{Head, Rendered};
 use crate::error::{Error, Result};
-use crate::image::{self, Film};
+use crate::image::{self, FILTERED, Film};
 use crate::render::settings::Settings;
 use crate::statistics::{BrokenSamples, Pixel, join};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Settings in which merged renders may differ.
 const FREE: [&str; 3] = ["spp", "first_sample", "seed"];
@@ -41,6 +41,10 @@ impl<'a> Part<'a> {
             true => Ok((rendered, film)),
             false => Err(about("was replaced while it was read: merge again".to_owned())),
         }
+    }
+
+    fn filtered(&self, film: &Film) -> Option<(PathBuf, String)> {
+        film.metadata.get(FILTERED).map(|filter| (self.path.to_owned(), filter.clone()))
     }
 
     /// By this the parts are sorted: no two that may be merged have the same.
@@ -81,6 +85,8 @@ pub struct Merged {
     pub film: Film,
     /// What is missing between its samples.
     pub gaps: Vec<Gap>,
+    /// The parts whose pictures were filtered, and by what. The merged picture is not.
+    pub filtered: Vec<(PathBuf, String)>,
 }
 
 /// Samples that lie between those of a merged film.
@@ -107,10 +113,12 @@ pub fn merge<P: AsRef<Path>>(files: &[P]) -> Result<Merged> {
         parts.split_first().ok_or_else(|| Error::Usage("there are no files to merge: name at least one".into()))?;
     // What is not joined is the same in all but for rounding: it is taken from the first.
     let (whole, mut film) = first.read()?;
+    let mut filtered: Vec<_> = first.filtered(&film).into_iter().collect();
     let mut ranges = ranges(first, whole.is_full());
     let Rendered { mut pixels, mut broken, .. } = whole;
     for part in others {
-        let (rendered, _) = part.read()?;
+        let (rendered, own) = part.read()?;
+        filtered.extend(part.filtered(&own));
         ranges.extend(self::ranges(part, rendered.is_full()));
         broken = BrokenSamples::join(broken, rendered.broken);
         pixels.iter_mut().zip(&rendered.pixels).for_each(|(a, b)| *a = join(a, b));
@@ -120,7 +128,7 @@ pub fn merge<P: AsRef<Path>>(files: &[P]) -> Result<Merged> {
     film::set_broken_samples(&mut film, broken);
     film.channels.retain(|c| c.name != film::PENDING && c.name != film::PRIORITY);
     provenance::set_samples(&mut film, &samples)?;
-    Ok(Merged { film, gaps: gaps(&samples) })
+    Ok(Merged { film, gaps: gaps(&samples), filtered })
 }
 
 /// The files by their first samples, if they can be merged.

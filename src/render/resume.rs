@@ -4,7 +4,7 @@ use super::rendered::Rendered;
 use super::{PathRange, Progress, Renderer, Step, film};
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
-use crate::image::{self, Film};
+use crate::image::{self, FILTERED, Film};
 use crate::render::schedule;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -29,6 +29,8 @@ pub struct Checkpoint {
     pub broken: Option<BrokenSamples>,
     /// Whether its pixels tell direct and indirect light apart.
     pub splits_light: bool,
+    /// The filter that made the picture, which is left out: samples are added to those that it was made of.
+    pub filtered: Option<String>,
 }
 
 impl Checkpoint {
@@ -68,7 +70,8 @@ impl Checkpoint {
             pending => pending.unwrap_or_else(|| vec![0; pixels.len()]),
         };
         let splits_light = film::splits_light(film)?;
-        Ok(Self { pixels, priority, pending, allocations: allocations(film)?, broken, splits_light })
+        let (allocations, filtered) = (allocations(film)?, film.metadata.get(FILTERED).cloned());
+        Ok(Self { pixels, priority, pending, allocations, broken, splits_light, filtered })
     }
 
     /// Where in the schedule it stopped.

@@ -116,6 +116,9 @@ pub struct Scene {
     pub names: Names,
     /// Readable lines about what was repaired on loading.
     pub warnings: Vec<String>,
+    /// The files that it is made of, to watch or not to write over: its own first, if it has one. The poses of `[[animation]]` tables,
+    /// which are read when they are shown, are not among them.
+    pub files: Vec<PathBuf>,
 }
 
 /// Latitude-longitude image: row 0 is straight up (+y), column 0 begins at direction -z, columns turn towards +x. For a
@@ -193,14 +196,16 @@ pub struct SceneFile<'a> {
     through: usize,
     /// What was repaired or passed over so far.
     warnings: Vec<String>,
+    /// Files that were read so far.
+    files: Vec<PathBuf>,
     /// What the loader of the file makes move, besides the description's own tables.
     movers: Vec<Arc<dyn Mover>>,
 }
 
 impl<'a> SceneFile<'a> {
     fn of(path: &Path, description: Cow<'a, Description>) -> Self {
-        let (choices, cameras, through, warnings, movers) = Default::default();
-        Self { path: path.to_owned(), description, choices, cameras, through, warnings, movers }
+        let (choices, cameras, through, warnings, files, movers) = Default::default();
+        Self { path: path.to_owned(), description, choices, cameras, through, warnings, files, movers }
     }
 
     /// Reads a scene file (`.toml`, `.gltf`, `.glb`), or takes a model (`.obj`, `.ply`, `.ply.gz`) for one.
@@ -239,9 +244,10 @@ impl<'a> SceneFile<'a> {
             let what = format!("{}: clip \"{clip}\" is not there: only glTF files have clips", path.display());
             return Err(Error::Usage(what));
         }
-        let gltf::Model { cameras, warnings, mover, .. } = asset;
+        let gltf::Model { cameras, warnings, mover, buffers, .. } = asset;
         let (choices, movers) = (Choices { sky, still: false }, mover.into_iter().collect());
-        Ok(Self { choices, cameras, warnings, movers, ..Self::of(path, Cow::Owned(description)) })
+        let files = [vec![path.to_owned()], buffers].concat();
+        Ok(Self { choices, cameras, warnings, files, movers, ..Self::of(path, Cow::Owned(description)) })
     }
 
     /// Looks through the camera of this name, which a glTF file holds. The film takes its shape.
@@ -291,13 +297,16 @@ impl<'a> SceneFile<'a> {
     pub fn load(&self) -> Result<Loaded> {
         let settings = self.settings()?;
         let mut scene = Scene { view: self.description.camera.clone(), ..Scene::default() };
-        let (description, included, warnings) = include::models(&self.path, &self.description)?;
+        let (description, included, warnings, of_models) = include::models(&self.path, &self.description)?;
         let description = animation::with_freed_meshes(&description);
         let carried = self.cameras.get(self.through).and_then(|camera| camera.mover.clone());
         let movers: Vec<_> = self.movers.iter().cloned().chain(included).chain(carried).collect();
         let still = self.choices.still && movers.is_empty() && description.animation.is_empty();
         threads::within(|| assemble(&self.path, &description, Choices { still, ..self.choices }, &mut scene))?;
         scene.warnings.splice(0..0, self.warnings.iter().chain(&warnings).cloned());
+        let named: Vec<_> = self.files.iter().chain(&of_models).cloned().collect();
+        scene.files.retain(|file| !named.contains(file)); // a model is a scene, and its mesh
+        scene.files.splice(0..0, named);
         let camera = scene.view.build([settings.width, settings.height], scene.bounds);
         camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
         let animation = animation::load(&self.path, &description, &movers, &scene)?;

@@ -1,10 +1,10 @@
 //! Tests the built program's outputs: all are tried, none replaces an input or another output, and printed text can be parsed.
 #![cfg(target_os = "linux")]
-use crate::child::{LONG, OFTEN, Running, SMALL, command, scene};
-use crate::command::complains;
+use crate::child::{LONG, OFTEN, Running, SMALL, command};
+use crate::command::{complains, scene};
 use std::path::Path;
 use std::process::{Command, Output};
-use tallow::image;
+use tallow::image::{self, Film, WriteOptions};
 use tempfile::TempDir;
 
 fn run(folder: &TempDir, words: &str) -> Output {
@@ -112,9 +112,9 @@ fn where_the_working_folder_takes_nothing_that_for_temporary_files_does() {
     std::fs::create_dir(inside("temporary")).unwrap();
     let mut begun = command(&inside("cwd"), &words);
     begun.env("TMPDIR", inside("temporary"));
-    let running = Running::start(begun, folder.path());
+    let mut running = Running::start(begun, folder.path());
     // Opened, and closed before anything was read.
-    let reader = std::fs::File::open(inside("pipe.exr")).unwrap();
+    let reader = running.out_of("pipe.exr", std::fs::File::open);
     std::fs::remove_dir(inside("cwd")).unwrap();
     drop(reader);
     complains(&running.end(), 5, &["pipe.exr: cannot be written", "temporary/pipe.exr instead"]);
@@ -226,4 +226,41 @@ fn files_of_the_working_folder_are_found_in_another_case() {
         let warnings = json["warnings"].to_string();
         assert!(warnings.contains("found as") && !warnings.contains("no such"), "{scene}: {warnings}");
     }
+}
+
+#[test]
+fn no_output_replaces_what_the_scene_is_made_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name);
+    let mut sky = Film::new(4, 2);
+    sky.add_vec3("", ["R", "G", "B"], &[[1.0; 3]; 8]);
+    image::write(&inside("sky.exr"), &sky, &WriteOptions::default()).unwrap();
+    image::write(&inside("wood.png"), &sky, &WriteOptions::default()).unwrap();
+    std::fs::write(inside("wood.mtl"), "newmtl wood\nmap_Kd wood.png\n").unwrap();
+    let wall = "mtllib wood.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl wood\nf 1/1 2/2 3/3\n";
+    std::fs::write(inside("wall.obj"), wall).unwrap();
+    let text = "[environment]\nfile = 'sky.exr'\n[[mesh]]\nfile = 'wall.obj'\n";
+    std::fs::write(inside("sky.toml"), text).unwrap();
+    let before = |name: &str| std::fs::read(inside(name)).unwrap();
+    let small = "--width 8 --height 8 --spp 1 --max-depth 2";
+    for (words, option, file) in [
+        ("render sky.toml", "the default output", "sky.exr"),
+        ("render sky.toml -o sky.exr", "-o", "sky.exr"),
+        ("render sky.toml -o ./wood.png", "-o", "wood.png"),
+        ("render wall.obj -o a.exr -o wood.png", "-o", "wood.png"),
+        ("render sky.toml -o a.exr --profile wall.obj", "--profile", "wall.obj"),
+        ("render sky.toml -o a.exr --heatmap wood.png", "--heatmap", "wood.png"),
+        ("profile sky.toml --frames 2 --csv wood.mtl", "--csv", "wood.mtl"),
+        ("profile sky.toml --frames 2 --trace wall.obj", "--trace", "wall.obj"),
+    ] {
+        let old = before(file);
+        complains(&run(&folder, &format!("{words} {small}")), 2, &[option, file, "of which the scene is made"]);
+        assert!(before(file) == old && !inside("a.exr").exists(), "{words}");
+    }
+    std::fs::rename(inside("wood.png"), inside("a.0001.png")).unwrap();
+    std::fs::write(inside("wood.mtl"), "newmtl wood\nmap_Kd a.0001.png\n").unwrap();
+    let sequence = format!("sequence wall.obj --frames 0..2 -o a.####.png {small}");
+    complains(&run(&folder, &sequence), 2, &["-o", "a.0001.png", "of which the scene is made"]);
+    assert!(!inside("a.0000.png").exists());
+    well(&run(&folder, &format!("render sky.toml -o other.exr --quiet {small}")));
 }

@@ -208,6 +208,25 @@ fn settings_that_keep_a_render_from_going_on_are_named() {
     complains(&placed, 3, &["other settings: spp was 2, now 4; policy was uniform, now geometry"]);
 }
 
+/// What a filter made of its parts is no picture of all samples.
+#[test]
+fn that_a_filter_is_left_out_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    well(render(&folder, "--spp 2 -o a.exr --denoise atrous"));
+    well(render(&folder, "--spp 2 --first-sample 2 -o b.exr"));
+    complains(
+        &run(&folder, "merge b.exr a.exr -o m.exr"),
+        0,
+        &["note: a.exr was filtered (atrous)", "tallow filter m.exr"],
+    );
+    assert!(!read(&folder, "m.exr").metadata.contains_key("filtered"));
+    let words = format!("render {SCENE} --width {SIZE} --height {SIZE} --max-depth 2 --spp 4 --resume a.exr -o c.exr");
+    let told = |words: &str| String::from_utf8(run(&folder, words).stderr).unwrap();
+    assert!(told(&words).contains("was filtered (atrous), and this one will not be: add --denoise atrous"));
+    let [filtered, quiet] = [told(&format!("{words} --denoise atrous")), told(&format!("{words} --quiet"))];
+    assert!(!filtered.contains("was filtered") && quiet.is_empty(), "{filtered}{quiet}");
+}
+
 #[test]
 fn a_file_without_layers_takes_no_merged_render() {
     let folder = tempfile::tempdir().unwrap();

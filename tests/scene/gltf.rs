@@ -61,6 +61,31 @@ fn pictures_may_lie_within_the_file() {
     assert_eq!([scene.shading[0].uv0, scene.shading[0].uv2], [[0.0, 0.0], [0.0, 1.0]]);
 }
 
+/// A roughness of 16 bits keeps them, and formats that are not read leave what the material says without a picture.
+#[test]
+fn pictures_within_the_file_are_read_as_files_are() {
+    let (mut png, folder) = (std::io::Cursor::new(Vec::new()), tempfile::tempdir().unwrap());
+    let texel = |x: u32, y: u32| image::Rgb([7, 0x8000 + x as u16 + 3 * y as u16, 0xffff]);
+    image::ImageBuffer::from_fn(3, 2, texel).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let png = png.into_inner();
+    let with = |image: Value| {
+        let mut json = triangle();
+        json["images"] = json!([image]);
+        json["textures"] = json!([{ "source": 0 }]);
+        json["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"] = json!({ "index": 0 });
+        std::fs::write(folder.path().join("a.gltf"), json.to_string()).unwrap();
+        Scene::load(&folder.path().join("a.gltf")).unwrap()
+    };
+    std::fs::write(folder.path().join("n.png"), &png).unwrap();
+    let [within, file] = [json!({ "uri": data(&png) }), json!({ "uri": "n.png" })].map(with);
+    assert_eq!((&within.textures, &within.texels), (&file.textures, &file.texels));
+    let different = |texels: &[u32]| texels.iter().collect::<std::collections::HashSet<_>>().len();
+    assert!(different(&within.texels) >= 6, "control: they differ by the last of 16 bits: {:x?}", within.texels);
+    let other = with(json!({ "uri": data(b"RIFF\x10\0\0\0WEBPVP8 ") }));
+    assert_eq!(other.textures, []);
+    assert!(said(&other)[0].contains("a.gltf: image 0: is no EXR, PNG"), "{:?}", other.warnings);
+}
+
 #[test]
 fn the_binary_form_is_the_same_scene() {
     let mut json = triangle();

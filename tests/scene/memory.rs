@@ -1,4 +1,5 @@
 //! Tests that scenes from an engine's memory equal those from files, and the messages about mistakes.
+use crate::gltf_file::{triangle, triangle_bytes};
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use tallow::image::{Picture, WriteOptions};
@@ -167,6 +168,50 @@ fn a_scene_in_memory_is_that_of_the_files() {
     );
 }
 
+/// To be watched, or not written over.
+#[test]
+fn a_scene_tells_the_files_that_it_is_made_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut film = tallow::image::Film::new(4, 2);
+    film.add_vec3("", ["R", "G", "B"], &sky().pixels);
+    tallow::image::write(&at("sky.exr"), &film, &WriteOptions::default()).unwrap();
+    image::RgbImage::new(1, 1).save(at("wood.png")).unwrap();
+    std::fs::write(at("wood.mtl"), "newmtl wood\nmap_Kd wood.png\n").unwrap();
+    let wall = "mtllib wood.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl wood\nf 1/1 2/2 3/3\n";
+    std::fs::write(at("wall.obj"), wall).unwrap();
+    let mut model = triangle();
+    model["buffers"][0]["uri"] = "a.bin".into();
+    std::fs::write(at("a.bin"), triangle_bytes()).unwrap();
+    std::fs::write(at("a.gltf"), model.to_string()).unwrap();
+    let text = "[environment]\nfile = 'sky.exr'\n[[mesh]]\nfile = 'wall.obj'\n[[mesh]]\nfile = 'a.gltf'\n";
+    std::fs::write(at("s.toml"), text).unwrap();
+    let files = |name: &str| -> Vec<String> {
+        let scene = Scene::load(&at(name)).unwrap();
+        scene.files.iter().map(|file| file.file_name().unwrap().to_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(files("s.toml"), ["s.toml", "a.gltf", "a.bin", "sky.exr", "wall.obj", "wood.mtl", "wood.png"]);
+    assert_eq!(files("a.gltf"), ["a.gltf", "a.bin"]);
+    assert_eq!(files("wall.obj"), ["wall.obj", "wood.mtl", "wood.png"]);
+    assert_eq!(build(&described()).unwrap().files, Vec::<std::path::PathBuf>::new());
+}
+
+/// Encoded, as a file holds them.
+#[test]
+fn pictures_in_memory_may_be_encoded() {
+    let mut description = described();
+    let mut png = std::io::Cursor::new(Vec::new());
+    let rgba = |x, y| image::Rgba(texel(3 * y + x));
+    image::RgbaImage::from_fn(3, 2, rgba).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let Bitmap { name, .. } = description.bitmap.pop().unwrap();
+    description.picture_file = vec![PictureFile { name, bytes: png.into_inner().into() }];
+    let (encoded, texels) = (build(&description).unwrap(), build(&described()).unwrap());
+    assert_eq!((&encoded.textures, &encoded.texels), (&texels.textures, &texels.texels));
+    description.picture_file[0].bytes = b"no picture"[..].into();
+    let error = build(&description).unwrap_err().to_string();
+    assert!(error.contains("pictures/checks") && error.contains("is no usable picture"), "{error}");
+}
+
 /// The one line that is said when `change` is made.
 fn error(change: impl Fn(&mut Description)) -> String {
     let mut description = described();
@@ -189,6 +234,8 @@ fn mistakes_are_one_line_with_place_and_remedy() {
     has(error(|d| d.bitmap[0].width = 4), &["bitmap \"pictures", "6 texels for 4 x 2"]);
     has(error(|d| d.bitmap[0].height = 0), &["bitmap \"pictures", "3 x 0"]);
     has(error(|d| d.bitmap.push(d.bitmap[0].clone())), &["bitmap \"pictures", "twice"]);
+    let encoded = |d: &mut Description| PictureFile { name: d.bitmap[0].name.clone(), bytes: [][..].into() };
+    has(error(|d| d.picture_file = vec![encoded(d)]), &["picture \"pictures", "twice"]);
     let sky = |change: &dyn Fn(&mut EnvironmentTable)| error(|d| change(d.environment.as_mut().unwrap()));
     has(sky(&|e| e.radiance = Some(Rgb([1.0; 3]))), &["[environment]", "both"]);
     has(sky(&|e| e.file = Some("a.exr".into())), &["[environment]", "both"]);

@@ -123,6 +123,18 @@ mod tests {
         assert!(texts[0].ends_with("[default: the image's largest] [a finite number above 0]"), "{}", texts[0]);
     }
 
+    #[test]
+    fn every_layer_goes_by_its_own_option() {
+        let option = |aov: &str| format!("--{aov}=of {aov}");
+        let words = ["colour", "albedo", "normal", "position", "depth", "variance", "samples"];
+        let matches = Layers::augment_args(Command::new("filter"))
+            .try_get_matches_from([vec!["filter".to_owned()], words.map(option).to_vec()].concat())
+            .unwrap();
+        let names = <Layers as clap::FromArgMatches>::from_arg_matches(&matches).unwrap().names();
+        let aovs = [Aov::Colour, Aov::Albedo, Aov::Normal, Aov::Position, Aov::Depth, Aov::Variance, Aov::Samples];
+        assert_eq!(names, aovs.into_iter().zip(words.map(|word| format!("of {word}"))).collect());
+    }
+
     fn named_alike<T: ValueEnum + Value>() -> bool {
         let option = |v: &T| v.to_possible_value().map(|word| word.get_name().to_owned());
         T::value_variants().iter().all(|v| option(v) == Some(v.text()))

@@ -1,5 +1,6 @@
 //! Runs the frames of a profile.
 use super::Args;
+use crate::cli::files::check_not_of_scene;
 use crate::cli::{fail_on_messages, render};
 use crate::denoise::filter::{Method, Row};
 use crate::error::{Error, Result};
@@ -38,6 +39,10 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     let denoise = args.denoise.filter(|method| !method.is_none() || settings.indirect_stride > 1);
     let filter = denoise.map(row).transpose()?;
     let scene = file.load()?.scene;
+    check_not_of_scene(
+        &args.outputs().map(|(option, path)| (option.to_owned(), path.to_owned())).collect::<Vec<_>>(),
+        &scene,
+    )?;
     args.common.warn(&scene.warnings);
     if let Some(old) = old {
         check_beside(old, &scene, &settings, filter)?;

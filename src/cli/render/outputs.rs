@@ -1,12 +1,13 @@
 //! The files that a render writes.
 use super::{Args, planned};
 use crate::cli::checkpoint::{self, CheckpointFile};
-use crate::cli::files::{Files, Item, check_distinct};
+use crate::cli::files::{Files, Item, check_distinct, check_not_of_scene};
 use crate::cli::{check_png, complain, quoted};
 use crate::error::Result;
 use crate::image::difference::false_colours;
 use crate::image::output::{self, Stream};
 use crate::image::{self, Film, WriteOptions};
+use crate::scene::Scene;
 use std::path::{Path, PathBuf};
 
 /// A render may take hours; what cannot be written, or would replace what it is not to, is told before.
@@ -26,10 +27,7 @@ pub fn check(args: &Args) -> Result<()> {
     }
     let (layers, colours): (Vec<_>, Vec<_>) =
         images.iter().map(|path| ("-o", path.as_path())).partition(|(_, path)| image::has_layers(path));
-    let maps = args.heatmap.iter().map(|path| ("--heatmap", path.as_path()));
-    let traces = args.profile.iter().map(|path| ("--profile", path.as_path()));
-    let plans = planned::to_write(args).map(|path| ("--plan", path));
-    let others: Vec<_> = colours.into_iter().chain(maps).chain(traces).chain(plans).collect();
+    let others: Vec<_> = colours.into_iter().chain(beside_images(args)).collect();
     let followed = args.plan.iter().filter(|_| !planned::is_made(args)).map(|path| ("--plan", path.as_path()));
     let resumed = args.resume.iter().map(|path| ("--resume", path.as_path()));
     // A resumed file may become the complete one.
@@ -37,6 +35,29 @@ pub fn check(args: &Args) -> Result<()> {
     let partial = args.checkpoint.map(|_| ("--checkpoint", checkpoint.as_path()));
     let all: Vec<_> = layers.into_iter().chain(others).chain(partial).collect();
     check_distinct(&all, &[("the scene", &args.scene)])
+}
+
+/// What is written beside images, by its option.
+fn beside_images(args: &Args) -> impl Iterator<Item = (&str, &Path)> {
+    let maps = args.heatmap.iter().map(|path| ("--heatmap", path.as_path()));
+    let traces = args.profile.iter().map(|path| ("--profile", path.as_path()));
+    let plans = planned::to_write(args).map(|path| ("--plan", path));
+    maps.chain(traces).chain(plans)
+}
+
+/// Once the scene is loaded, which tells what it is made of.
+///
+/// # Errors
+/// [`crate::error::Error::Usage`].
+pub fn check_with(args: &Args, scene: &Scene) -> Result<()> {
+    check_not_of_scene(&all(args), scene)
+}
+
+/// All files that are written, by their options.
+pub fn all(args: &Args) -> Vec<(String, PathBuf)> {
+    let option = if args.outputs.is_empty() { "the default output" } else { "-o" };
+    let images = args.output_files().into_iter().map(|path| (option.to_owned(), path));
+    images.chain(beside_images(args).map(|(option, path)| (option.to_owned(), path.to_owned()))).collect()
 }
 
 /// Writes those of the items that are files, and brings the checkpoint up to date or removes it: where an image has all layers, or

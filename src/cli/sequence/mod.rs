@@ -6,12 +6,13 @@ mod stage;
 mod survey;
 
 use super::common::{frames_per_second, with_ranges};
-use super::files::scene_name;
+use super::files::{check_not_of_scene, scene_name};
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
 use crate::error::{Error, Result};
 use crate::image;
 use crate::render::{Carriage, Reproject, ReprojectOverrides};
+use crate::scene::Scene;
 use crate::scene::description::numbered;
 use clap::builder::Resettable;
 use clap::{Arg, Id};
@@ -154,6 +155,15 @@ impl Args {
         };
         self.preview.iter().try_for_each(|path| preview::check(path))?;
         outputs::check(&self.of_frame(first)?)
+    }
+
+    /// What is written, once the scene is loaded.
+    fn check_with(&self, frames: &Range<u32>, scene: &Scene) -> Result<()> {
+        let mut files: Vec<_> = self.preview.iter().map(|path| ("--preview".to_owned(), path.clone())).collect();
+        for number in self.numbers(frames)? {
+            files.extend(outputs::all(&self.of_frame(number)?));
+        }
+        check_not_of_scene(&files, scene)
     }
 }
 

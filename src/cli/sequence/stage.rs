@@ -58,6 +58,7 @@ impl<'a> Stage<'a> {
     pub fn new(args: &'a Args) -> Result<Self> {
         let (Loaded { mut scene, mut animation, .. }, settings) = render::load(&args.render)?;
         let frames = args.frames.clone().map_or_else(|| whole(&animation, args.fps), Ok)?;
+        args.check_with(&frames, &scene)?;
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         scene.view.framed = survey.bounds().or(scene.view.framed);
         let framed = scene.view.framed;

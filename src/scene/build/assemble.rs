@@ -46,6 +46,7 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
         || early.decode(),
         || {
             sources.read_files()?;
+            scene.files = sources.files().into_iter().collect();
             match sources.library.materials.list.iter().any(split::is_pictured) {
                 true => Ok(None), // lamps are split by what their pictures show
                 false => geometry(&mut sources, choices.still, scene).map(Some),

@@ -56,14 +56,13 @@ pub fn light(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
 
 /// `brightest`: radiance that texels are clamped to.
 fn image_of(sources: &mut Sources, table: &EnvironmentTable, brightest: f32) -> Result<Option<Environment>> {
-    let directory = sources.directory();
     let at = |what: String| Error::input_at(sources.path, PLACE, what);
+    let file = table.file.as_ref().map(|file| sources.beside(file));
     let warnings = &mut sources.library.warnings;
-    match (&table.file, &table.picture) {
+    match (file, &table.picture) {
         _ if table.radiance.is_some() => Err(at("has both radiance and an image: choose one".to_owned())),
         (Some(_), Some(_)) => Err(at("has both file and picture: choose one".to_owned())),
-        (Some(file), None) => {
-            let path = directory.join(file.to_string_lossy().replace('\\', "/"));
+        (Some(path), None) => {
             let picture = load(&path)?;
             from_picture(&path.display().to_string(), &picture, brightest, warnings)
                 .map_err(|what| unusable(&path, &what))

@@ -39,14 +39,14 @@ fn wears_own(mesh: &MeshTable) -> bool {
 }
 
 impl<'a> Sources<'a> {
-    /// Takes the bitmaps and materials of a description, and reads the MTL files that OBJ files name near their beginning;
+    /// Takes the pictures and materials of a description, and reads the MTL files that OBJ files name near their beginning;
     /// others are read when an OBJ file reaches them.
     ///
     /// # Errors
     /// For what is wrong with them, with its place.
     pub fn new(path: &'a Path, description: &'a Description) -> Result<Self> {
         let mut sources = Self { path, description, library: Library::default(), files: HashMap::new() };
-        sources.add_bitmaps()?;
+        sources.add_pictures()?;
         sources.add_materials()?;
         let obj_files = |worn: bool| -> BTreeSet<PathBuf> {
             let meshes = description.mesh.iter().filter(|m| wears_own(m) == worn);
@@ -63,15 +63,32 @@ impl<'a> Sources<'a> {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
+    /// The files that were read, or are, sorted.
+    pub fn files(&self) -> BTreeSet<PathBuf> {
+        let sky = self.description.environment.as_ref().and_then(|table| table.file.as_ref());
+        let sky = sky.map(|file| self.beside(file));
+        self.files.keys().chain(self.library.files()).cloned().chain(sky).collect()
+    }
+
+    /// What the scene file names by `file`.
+    pub fn beside(&self, file: &Path) -> PathBuf {
+        self.directory().join(file.to_string_lossy().replace('\\', "/"))
+    }
+
     /// An error at a place in the scene file.
     pub fn at(&self, place: impl Display, what: impl Display) -> Error {
         Error::input_at(self.path, place, what)
     }
 
-    fn add_bitmaps(&mut self) -> Result<()> {
-        for bitmap in &self.description.bitmap {
+    fn add_pictures(&mut self) -> Result<()> {
+        let Description { bitmap, picture_file, .. } = self.description;
+        for bitmap in bitmap {
             let taken = self.library.materials.textures.add_bitmap(bitmap);
             taken.map_err(|what| self.at(format!("bitmap \"{}\"", bitmap.name.display()), what))?;
+        }
+        for file in picture_file {
+            let taken = self.library.materials.textures.add_file(file);
+            taken.map_err(|what| self.at(format!("picture \"{}\"", file.name.display()), what))?;
         }
         Ok(())
     }

@@ -66,3 +66,12 @@ pub struct Bitmap {
     /// alpha, always linear, is what masks read.
     pub rgba: Arc<[[u8; 4]]>,
 }
+
+/// A picture in memory as a file holds it: a texture that materials name as they name a file. It is decoded beside all others.
+#[derive(Clone, Debug)]
+pub struct PictureFile {
+    /// What materials call it; wins over a file of that name, and may be that of no [`Bitmap`].
+    pub name: PathBuf,
+    /// The bytes of a PNG, JPEG, EXR, HDR, TGA or BMP file, sRGB or linear as they are of a file.
+    pub bytes: Arc<[u8]>,
+}

@@ -4,7 +4,7 @@
 //! instance and nowhere else, `world_from_object = instance transform * mesh transform`.
 //!
 //! An engine fills in the same tables for [`Scene::build`](super::Scene::build), with [`MeshTable::data`],
-//! [`Description::bitmap`] and [`EnvironmentTable::picture`] in place of files.
+//! [`Description::bitmap`], [`Description::picture_file`] and [`EnvironmentTable::picture`] in place of files.
 pub(super) mod animation;
 pub(super) mod camera;
 pub(super) mod keys;
@@ -21,7 +21,7 @@ pub(super) use animation::{mesh_number, meshes_to_free};
 pub use camera::{Camera, FovAxis};
 pub use light::{LightTable, Type as LightType};
 pub use material::{AlphaMode, Distribution, MaterialTable, Type as MaterialType};
-pub use mesh::{Bitmap, Mesh};
+pub use mesh::{Bitmap, Mesh, PictureFile};
 pub use shape::Shape;
 pub use texture::{TextureFilter, TextureTable, Wrap};
 pub(in crate::scene) use value::affine;
@@ -62,6 +62,9 @@ pub struct Description {
     /// Textures in memory, which materials name as they name files.
     #[serde(skip)]
     pub bitmap: Vec<Bitmap>,
+    /// Encoded pictures in memory, which materials name as they name files.
+    #[serde(skip)]
+    pub picture_file: Vec<PictureFile>,
 }
 
 /// The `[environment]` table; orientation: see `build/environment.rs`.

@@ -1,4 +1,4 @@
-//! Textures as materials name them: a file or a bitmap in memory, and how it lies on a surface.
+//! Textures as materials name them: a file, or a picture in memory, and how it lies on a surface.
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor, value};
 use std::fmt;

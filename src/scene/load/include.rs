@@ -8,11 +8,11 @@ use crate::scene::pose::Pose;
 use glam::{DAffine3, Vec3};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A description without glTF files, what moves in those that it had, and warnings about them.
-pub type Included<'a> = (Cow<'a, Description>, Vec<Arc<dyn Mover>>, Vec<String>);
+/// A description without glTF files, what moves in those that it had, warnings about them, and all files that they consist of.
+pub type Included<'a> = (Cow<'a, Description>, Vec<Arc<dyn Mover>>, Vec<String>, Vec<PathBuf>);
 
 /// Reads the glTF files that a description's meshes name; `path` is that of the scene file. Their cameras and skies are left out.
 ///
@@ -25,13 +25,13 @@ pub fn models<'a>(path: &Path, from: &'a Description) -> Result<Included<'a>> {
     let names_model = |name: &str| named.get(name).is_some_and(|&number| is_model(&from.mesh[number]));
     let mut keys = keys_of_nodes(path, from, names_model)?;
     if !from.mesh.iter().any(is_model) {
-        return Ok((Cow::Borrowed(from), Vec::new(), Vec::new()));
+        return Ok((Cow::Borrowed(from), Vec::new(), Vec::new(), Vec::new()));
     }
     let (of_models, instance): (Vec<_>, Vec<_>) = from.instance.iter().cloned().partition(|i| names_model(&i.mesh));
     let mut instances: HashMap<_, Vec<_>> = HashMap::new();
     of_models.iter().for_each(|instance| instances.entry(&*instance.mesh).or_default().push(instance));
     let mut to = Description { mesh: Vec::new(), instance, ..from.clone() };
-    let (mut movers, mut warnings) = (Vec::new(), Vec::new());
+    let (mut movers, mut warnings, mut files) = (Vec::new(), Vec::new(), Vec::new());
     for (number, table) in from.mesh.iter().enumerate() {
         if !is_model(table) {
             to.mesh.push(table.clone());
@@ -48,11 +48,14 @@ pub fn models<'a>(path: &Path, from: &'a Description) -> Result<Included<'a>> {
         let place = Place::new(path, table, name, &placed)?;
         let directory = path.parent().unwrap_or(Path::new(""));
         let file = table.file.as_ref().map(|file| file.to_string_lossy().replace('\\', "/")).unwrap_or_default();
-        let mut model = gltf::load(&directory.join(file), directory, table.clip.as_deref(), keyed)?;
+        let file = directory.join(file);
+        let mut model = gltf::load(&file, directory, table.clip.as_deref(), keyed)?;
         warnings.append(&mut model.warnings);
+        files.push(file);
+        files.append(&mut model.buffers);
         movers.extend(place.add(model, from, &mut to));
     }
-    Ok((Cow::Owned(to), movers, warnings))
+    Ok((Cow::Owned(to), movers, warnings, files))
 }
 
 /// By the name of a glTF file's mesh: the keys of animation tables that move its nodes, by their names.
@@ -107,8 +110,8 @@ impl<'a> Place<'a> {
     /// Adds what a file holds to a description; returns what moves it.
     fn add(&self, model: Model, from: &Description, to: &mut Description) -> Option<Arc<dyn Mover>> {
         let Model { description, mover, .. } = model;
-        let known: HashSet<_> = to.bitmap.iter().map(|bitmap| bitmap.name.clone()).collect();
-        to.bitmap.extend(description.bitmap.into_iter().filter(|bitmap| !known.contains(&bitmap.name)));
+        let known: HashSet<_> = to.picture_file.iter().map(|file| file.name.clone()).collect();
+        to.picture_file.extend(description.picture_file.into_iter().filter(|file| !known.contains(&file.name)));
         let materials = self.add_materials(description.material, from, to);
         let placed: HashSet<_> = description.instance.iter().map(|instance| instance.mesh.clone()).collect();
         let meshes = to.mesh.len();

@@ -69,6 +69,11 @@ impl Library {
         }
     }
 
+    /// The MTL files that were read, and the pictures that all materials name.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.mtls.keys().chain(self.materials.textures.files())
+    }
+
     /// The materials of an MTL file, read once however its path is written.
     ///
     /// # Errors

@@ -5,16 +5,17 @@ mod source;
 use super::find::find_file;
 use super::mapping::Mapping;
 use crate::error::{Checked, Error, Result};
-use crate::image::{NO_IMAGE, contained, input};
+use crate::image::{NO_IMAGE, contained, input, is_unread};
 use crate::layout::{NONE, TEXTURE_FLOAT, TEXTURE_RGB9E5, TEXTURE_SRGB, Texture};
 use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb_f64;
 use crate::memory;
-use crate::scene::description::mesh::Bitmap;
+use crate::scene::description::mesh::{Bitmap, PictureFile};
 use rayon::prelude::*;
 use source::Source;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Contents of a picture, which decide how it is decoded and which channels are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -74,7 +75,7 @@ impl Kind {
 /// The pictures that materials name. Each is stored once per kind, however many mappings share it.
 #[derive(Clone, Debug, Default)]
 pub struct TextureSet {
-    bitmaps: HashMap<PathBuf, Bitmap>,
+    in_memory: HashMap<PathBuf, InMemory>,
     pictures: Vec<(PathBuf, Kind)>,
     /// Index of each kind of each picture, by its canonical path.
     known: HashMap<(PathBuf, Kind), usize>,
@@ -83,6 +84,14 @@ pub struct TextureSet {
     index: HashMap<(PathBuf, Kind, [u32; 7]), u32>,
     /// Whether pictures that were asked about are normal maps.
     normals: HashMap<PathBuf, bool>,
+}
+
+/// A picture that is no file.
+#[derive(Clone, Debug)]
+enum InMemory {
+    Bitmap(Bitmap),
+    /// The bytes of a file.
+    Encoded(Arc<[u8]>),
 }
 
 /// Device arrays of all pictures.
@@ -107,8 +116,20 @@ impl TextureSet {
         if rgba.len() != width as usize * height as usize {
             return Err(format!("has {} texels for {width} x {height}", rgba.len()));
         }
-        let name = bitmap.name.to_string_lossy().replace('\\', "/"); // as materials ask for it
-        match self.bitmaps.insert(name.into(), bitmap.clone()) {
+        self.offer(&bitmap.name, InMemory::Bitmap(bitmap.clone()))
+    }
+
+    /// Offers an encoded picture in memory under its name.
+    ///
+    /// # Errors
+    /// Where the name is taken. What is wrong with the picture is told when it is decoded.
+    pub fn add_file(&mut self, file: &PictureFile) -> Checked {
+        self.offer(&file.name, InMemory::Encoded(file.bytes.clone()))
+    }
+
+    fn offer(&mut self, name: &Path, picture: InMemory) -> Checked {
+        let name = name.to_string_lossy().replace('\\', "/"); // as materials ask for it
+        match self.in_memory.insert(name.into(), picture) {
             Some(_) => Err("is there twice: rename one".to_owned()),
             None => Ok(()),
         }
@@ -116,7 +137,7 @@ impl TextureSet {
 
     /// Index of the picture, or [`NONE`] with a warning when there is no such file, or one of a format that is not read.
     pub fn request(&mut self, dir: &Path, file: &str, kind: Kind, mapping: Mapping, warn: &mut Vec<String>) -> u32 {
-        let in_memory = self.bitmaps.contains_key(Path::new(file)).then(|| (file.into(), false));
+        let in_memory = self.in_memory.contains_key(Path::new(file)).then(|| (file.into(), false));
         let Some((path, mended)) = in_memory.or_else(|| find_file(dir, file)) else {
             warn.push(format!("texture {}: no such file; its constant colour is used", dir.join(file).display()));
             return NONE;
@@ -124,7 +145,7 @@ impl TextureSet {
         if mended {
             warn.push(format!("texture {}: found as {}", dir.join(file).display(), path.display()));
         }
-        if !self.bitmaps.contains_key(&path) && input::is_of_another_format(&path) {
+        if self.is_of_another_format(&path) {
             let what = format!("{NO_IMAGE}; its constant colour is used: save it as PNG");
             warn.push(format!("texture {}: {what}", path.display()));
             return NONE;
@@ -144,7 +165,7 @@ impl TextureSet {
     /// Whether the colours of a picture are those of a normal map in tangent space. False for what cannot be read, which is
     /// reported when all are decoded.
     pub fn holds_normals(&mut self, dir: &Path, file: &str) -> bool {
-        let in_memory = self.bitmaps.contains_key(Path::new(file)).then(|| file.into());
+        let in_memory = self.in_memory.contains_key(Path::new(file)).then(|| file.into());
         let Some(path) = in_memory.or_else(|| find_file(dir, file).map(|(path, _)| path)) else { return false };
         if let Some(&known) = self.normals.get(&path) {
             return known;
@@ -157,6 +178,11 @@ impl TextureSet {
     /// Whether a texture is read at the second set of coordinates.
     pub fn any_second(&self) -> bool {
         self.wanted.iter().any(|(_, mapping)| mapping.second)
+    }
+
+    /// The files among the pictures, each once or more.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.pictures.iter().map(|(path, _)| path).filter(|path| !self.in_memory.contains_key(*path))
     }
 
     /// Whether no texture is there so far.
@@ -224,16 +250,25 @@ impl TextureSet {
         lamps.filter_map(warning).collect()
     }
 
-    fn source(&self, path: &Path) -> Result<Source> {
-        match self.bitmaps.get(path) {
-            Some(bitmap) => Ok(Source::Bitmap(bitmap.clone())),
-            None => Source::read(path),
+    fn source(&self, path: &Path) -> Result<Source<'_>> {
+        match self.in_memory.get(path) {
+            Some(InMemory::Bitmap(bitmap)) => Ok(Source::Bitmap(bitmap.clone())),
+            Some(InMemory::Encoded(bytes)) => Source::of(bytes[..].into(), path),
+            None => Source::of(input::read(path)?.into(), path),
+        }
+    }
+
+    fn is_of_another_format(&self, path: &Path) -> bool {
+        match self.in_memory.get(path) {
+            Some(InMemory::Bitmap(_)) => false,
+            Some(InMemory::Encoded(bytes)) => is_unread(bytes),
+            None => input::is_of_another_format(path),
         }
     }
 }
 
 /// Bytes that the largest pictures take while each thread decodes one: as decoded (at most 8 per texel) and as texels.
-fn while_decoded(sources: &[Source]) -> u64 {
+fn while_decoded(sources: &[Source<'_>]) -> u64 {
     let sizes = sources.iter().map(Source::size);
     let mut texels: Vec<_> = sizes.map(|[width, height]| u64::from(width) * u64::from(height)).collect();
     texels.sort_unstable_by(|a, b| b.cmp(a));
@@ -241,7 +276,7 @@ fn while_decoded(sources: &[Source]) -> u64 {
 }
 
 /// Each picture with its own part of the texel array.
-fn jobs(sources: Vec<Source>, mut texels: &mut [u32]) -> Vec<(Source, &mut [u32])> {
+fn jobs<'a, 'b>(sources: Vec<Source<'a>>, mut texels: &'b mut [u32]) -> Vec<(Source<'a>, &'b mut [u32])> {
     let mut jobs = Vec::with_capacity(sources.len());
     for source in sources {
         let [width, height] = source.size();

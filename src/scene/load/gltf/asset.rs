@@ -7,7 +7,7 @@ use crate::memory;
 use gltf_json::Root;
 use serde_json::Value;
 use std::fmt::Display;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A file that was read. Indices and lengths in `root` are as the file has them: see `check`.
 pub struct Asset<'a> {
@@ -74,6 +74,16 @@ impl<'a> Asset<'a> {
             true => Ok(&buffer[first as usize..end as usize]),
             false => Err(at(format!("ends at byte {end} of buffer {named}, which has {}", buffer.len()))),
         }
+    }
+
+    /// Files of the buffers that are no part of the asset.
+    pub fn buffer_files(&self) -> Vec<PathBuf> {
+        let uris = self.root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+        let file = |uri| match uri::resolve(self.folder(), uri) {
+            Ok(Target::File(path)) => Some(path),
+            _ => None,
+        };
+        uris.filter(|uri| !uri.starts_with("data:")).filter_map(file).collect()
     }
 
     fn check_version(&self) -> Result<()> {

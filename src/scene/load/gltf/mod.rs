@@ -32,7 +32,7 @@ use gltf_json::Node;
 use motion::{CameraMotion, Motion, MovedLight};
 use node::Tree;
 use place::{Moved, Placed, Placer};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What a glTF file holds.
@@ -46,6 +46,8 @@ pub struct Model {
     pub mover: Option<Arc<dyn Mover>>,
     /// Readable lines about what is not rendered or was repaired.
     pub warnings: Vec<String>,
+    /// Files of its buffers.
+    pub buffers: Vec<PathBuf>,
 }
 
 /// Reads a `.gltf` or `.glb` file. A file without lights of `KHR_lights_punctual` gets a sky of radiance 1, since glTF has no
@@ -56,7 +58,7 @@ pub struct Model {
 /// [`crate::error::Error::Input`] with file, place and remedy, also for a clip or node that is not there; [`crate::error::Error::Memory`].
 pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Keyed)>) -> Result<Model> {
     let (asset, left_out) = Asset::read(path, base, extension::check)?;
-    let mut model = Model::default();
+    let mut model = Model { buffers: asset.buffer_files(), ..Model::default() };
     model.warnings.extend(left_out);
     check::check(&asset)?;
     let tree = Tree::new(&asset)?;

@@ -1,10 +1,9 @@
-//! Textures of glTF: pictures in files are named to the renderer, those within the asset are decoded.
-use super::asset::{Asset, one_line};
+//! Textures of glTF: pictures in files are named to the renderer, those within the asset are handed over as they are.
+use super::asset::Asset;
 use super::extension;
 use super::uri::{self, Target};
 use crate::error::Result;
-use crate::image::{contained, picture};
-use crate::scene::description::{Bitmap, TextureFilter, TextureTable, Wrap};
+use crate::scene::description::{PictureFile, TextureFilter, TextureTable, Wrap};
 use crate::scene::load::mapping::Mapping;
 use gltf_json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf_json::validation::Checked;
@@ -13,6 +12,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A reference to a texture, as all kinds of them have it.
 #[derive(Clone, Deserialize)]
@@ -48,7 +48,7 @@ impl Default for TextureTransform {
 #[derive(Default)]
 pub struct Pictures {
     /// Those within the asset.
-    pub bitmaps: Vec<Bitmap>,
+    pub within: Vec<PictureFile>,
     /// By index of the image: what materials name it by; `None` for one that cannot be had.
     names: HashMap<usize, Option<PathBuf>>,
     /// Messages about what is missing.
@@ -59,7 +59,7 @@ impl Pictures {
     /// The table of a texture, or `None` with a warning where it has no picture.
     ///
     /// # Errors
-    /// [`crate::error::Error::Input`] for an index that leads nowhere, and for a picture that cannot be decoded.
+    /// [`crate::error::Error::Input`] for an index or an address that leads nowhere.
     pub fn table(&mut self, asset: &Asset, info: &TextureInfo, place: &str) -> Result<Option<TextureTable>> {
         let textures = &asset.root.textures;
         let missing = || asset.at(place, format!("names texture {} of {}", info.index, textures.len()));
@@ -95,10 +95,10 @@ impl Pictures {
     }
 
     fn named(&mut self, asset: &Asset, image: &Image, place: &str) -> Result<Option<PathBuf>> {
-        let bytes = match (image.buffer_view, &image.uri) {
-            (Some(view), _) => asset.view(view.value())?.to_vec(),
+        let bytes: Arc<[u8]> = match (image.buffer_view, &image.uri) {
+            (Some(view), _) => asset.view(view.value())?.into(),
             (None, Some(uri)) => match uri::resolve(asset.folder(), uri).map_err(|what| asset.at(place, what))? {
-                Target::Data(bytes) => bytes,
+                Target::Data(bytes) => bytes.into(),
                 Target::File(path) => {
                     // The renderer finds it from the scene's folder on, as it finds the pictures of other scenes.
                     return Ok(Some(path.strip_prefix(asset.base).unwrap_or(&path).to_owned()));
@@ -109,12 +109,8 @@ impl Pictures {
                 return Ok(None);
             }
         };
-        let decoded = contained(|| picture(&bytes)).map_err(|what| asset.at(place, one_line(&what)))?;
-        let texels = decoded.into_rgba8();
-        let (width, height) = texels.dimensions();
-        let name = PathBuf::from(format!("{place} of {}", asset.path.display()));
-        let rgba = texels.pixels().map(|p| p.0).collect();
-        self.bitmaps.push(Bitmap { name: name.clone(), width, height, rgba });
+        let name = PathBuf::from(format!("{}: {place}", asset.path.display()));
+        self.within.push(PictureFile { name: name.clone(), bytes });
         Ok(Some(name))
     }
 }

@@ -204,7 +204,7 @@ impl<'a> Placer<'a> {
         description.mesh = self.tables;
         description.instance = self.instances;
         description.material = self.materials;
-        description.bitmap = self.pictures.bitmaps;
+        description.picture_file = self.pictures.within;
         Ok(self.found)
     }
 

@@ -1,30 +1,30 @@
 //! Pictures that are still to be decoded, and how their texels are filled.
 use super::{Kind, check_size, damaged};
 use crate::error::{Checked, Error, Result};
-use crate::image::{BAND, bands, check_end, claim, decode, has_16_bits, holds_floats, input, picture};
+use crate::image::{BAND, bands, check_end, claim, decode, has_16_bits, holds_floats, picture};
 use crate::layout::TEXTURE_FLOAT;
 use crate::scene::description::mesh::Bitmap;
 use image::DynamicImage;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// A picture to be decoded.
-pub enum Source {
+pub enum Source<'a> {
     /// The bytes of a file, and the size that its header says.
-    File(Vec<u8>, [u32; 2]),
+    File(Cow<'a, [u8]>, [u32; 2]),
     /// The same of a PNG of 16 bits a channel.
-    Deep(Vec<u8>, [u32; 2]),
+    Deep(Cow<'a, [u8]>, [u32; 2]),
     /// The same of an EXR or HDR file.
-    Floats(Vec<u8>, [u32; 2]),
+    Floats(Cow<'a, [u8]>, [u32; 2]),
     Bitmap(Bitmap),
 }
 
-impl Source {
-    /// Reads a file and checks what its header says.
+impl<'a> Source<'a> {
+    /// Checks what the header of a file says.
     ///
     /// # Errors
     /// [`Error::Input`] for what is no picture of a usable size.
-    pub fn read(path: &Path) -> Result<Self> {
-        let bytes = input::read(path)?;
+    pub fn of(bytes: Cow<'a, [u8]>, path: &Path) -> Result<Self> {
         check_end(&bytes).map_err(|what| Error::input(path, what))?;
         let [width, height] = claim(&bytes).map_err(|what| damaged(path, what))?.size;
         check_size(width, height).map_err(|what| Error::input(path, what))?;
