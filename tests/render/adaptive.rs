@@ -385,6 +385,7 @@ fn geometry_is_unbiased_and_learning_nearly_so() {
         let off = (mean - reference.0).abs();
         println!("{policy}: {mean:.5} +- {error:.5}, uniform {:.5} +- {:.5}", reference.0, reference.1);
         assert!(off < 4.0 * error.hypot(reference.1) + bias * reference.0, "{policy}: {mean} {error} {reference:?}");
+        assert!(error < 0.01 * mean, "control, {policy}: {mean} +- {error} tells");
     }
 }
 
