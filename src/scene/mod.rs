@@ -309,7 +309,8 @@ impl<'a> SceneFile<'a> {
         scene.files.splice(0..0, named);
         let camera = scene.view.build([settings.width, settings.height], scene.bounds);
         camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
-        let animation = animation::load(&self.path, &description, &movers, &scene)?;
+        let (animation, warnings) = animation::load(&self.path, &description, &movers, &scene)?;
+        scene.warnings.extend(warnings);
         if !animation.is_empty() {
             scene.view.framed = Some(scene.bounds);
             scene.large_lamps = scene.large_lamps || animation.moves_surfaces();

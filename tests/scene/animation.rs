@@ -337,3 +337,37 @@ fn a_mesh_goes_through_the_poses_of_its_files() {
     fs::remove_file(folder.path().join("p_02.obj")).unwrap();
     assert!(loaded.animation.at(1.0).unwrap_err().to_string().contains("p_02.obj"));
 }
+
+/// Before a frame is rendered: a later one would fail, or stop short of what its key says.
+#[test]
+fn numbers_of_keys_are_checked_when_the_scene_is_loaded() {
+    let table = |what: &str, keys: &str| format!("[[animation]]\n{what}\nkeys = [{keys}]\n");
+    let at_two = |what: &str, key: &str, from: f64, to: f64| {
+        table(what, &format!("{{ time = 0, {key} = {from} }}, {{ time = 2.5, {key} = {to} }}"))
+    };
+    let (grey, bulb) = ("material = \"grey\"", "light = \"bulb\"");
+    for (tables, words) in [
+        (at_two("environment = true", "radiance", 1.0, -1.0), "environment: radiance [-1.0, -1.0, -1.0] is negative"),
+        (at_two(grey, "emission", 0.0, -1.0), "material \"grey\": emission [-1.0, -1.0, -1.0] is negative"),
+        (at_two(grey, "opacity", 1.0, -1.0), "material \"grey\": opacity is -1"),
+        (at_two(bulb, "intensity", 1.0, -1.0), "light 0: "),
+        (at_two("camera = true", "fov", 40.0, 200.0), "camera: fov is 200"),
+    ] {
+        let line = error(&tables);
+        assert!(line.contains("animation 1") && line.contains("key 2, at 2.5: ") && line.contains(words), "{line}");
+        assert!(
+            Scene::parse(Path::new("s.toml"), &(STAGE.to_owned() + &tables.replace("-1", "1").replace("200", "20")))
+                .is_ok()
+        );
+    }
+    let warnings = |to: f64| {
+        let text = STAGE.to_owned() + &at_two(grey, "color", 0.5, to);
+        Scene::parse(Path::new("s.toml"), &text).unwrap().scene.warnings
+    };
+    assert_eq!(warnings(1.0), Vec::<String>::new());
+    let found = warnings(1.5);
+    assert_eq!(
+        found,
+        ["animation 1, key 2, at 2.5: material \"grey\": color [1.5, 1.5, 1.5] lies outside [0, 1]: clamped"]
+    );
+}

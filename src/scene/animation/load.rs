@@ -5,10 +5,12 @@ use super::keyed::{Keyed, Target};
 use super::{Animation, Mover};
 use crate::error::{Checked, Error, Result};
 use crate::scene::Scene;
+use crate::scene::apply::check_numbers;
 use crate::scene::description::{
     self, AnimationTable, Camera, Description, Interpolation, mesh_number, meshes_to_free, numbered, rotation,
 };
 use crate::scene::description::{Key, Transform, affine};
+use crate::scene::pose::Pose;
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -25,11 +27,17 @@ pub fn with_freed_meshes(description: &Description) -> Cow<'_, Description> {
     freed
 }
 
-/// The movers of a scene file's tables, after those that its loader has.
+/// The movers of a scene file's tables, after those that its loader has, and warnings about what their keys say.
 ///
 /// # Errors
-/// [`Error::Input`] with the table at fault.
-pub fn load(path: &Path, description: &Description, movers: &[Arc<dyn Mover>], scene: &Scene) -> Result<Animation> {
+/// [`Error::Input`] with the table at fault, and the key whose numbers are out of range.
+pub fn load(
+    path: &Path,
+    description: &Description,
+    movers: &[Arc<dyn Mover>],
+    scene: &Scene,
+) -> Result<(Animation, Vec<String>)> {
+    let mut warnings = Vec::new();
     let mut animation = Animation { movers: movers.to_vec() };
     let mut moved = HashSet::new();
     for (number, table) in (1..).zip(&description.animation) {
@@ -39,9 +47,16 @@ pub fn load(path: &Path, description: &Description, movers: &[Arc<dyn Mover>], s
         if !moved.insert(what.clone()) {
             return Err(at(format!("{what} is moved by an earlier table: put all keys into one")));
         }
+        for (key_number, key) in (1..).zip(&table.keys) {
+            let said = format!("key {key_number}, at {}", key.time);
+            let mut pose = Pose::default();
+            mover.iter().try_for_each(|mover| mover.pose(key.time, &mut pose))?;
+            let clamped = check_numbers(scene, &pose).map_err(|what| at(format!("{said}: {what}")))?;
+            warnings.extend(clamped.iter().map(|what| format!("{place}, {said}: {what}")));
+        }
         animation.movers.extend(mover);
     }
-    Ok(animation)
+    Ok((animation, warnings))
 }
 
 /// The keys of a table that moves a node of a glTF file.

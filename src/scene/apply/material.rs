@@ -29,7 +29,7 @@ pub fn changed(m: &Material, to: &MaterialChange) -> Result<Material, String> {
         m.transmission = tint(transmission, "transmission")?;
     }
     if let Some(emission) = to.emission {
-        m.emission = radiance(emission)?;
+        m.emission = radiance(emission, "emission")?;
     }
     if let Some(alpha) = to.alpha {
         m.alpha = within(alpha, 1.0, "alpha")?;

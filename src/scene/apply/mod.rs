@@ -3,6 +3,8 @@ mod commit;
 mod material;
 mod next;
 
+pub use next::check_numbers;
+
 use super::{Change, Pose, Scene};
 use crate::error::{Error, Result};
 use crate::threads;

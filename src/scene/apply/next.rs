@@ -10,7 +10,7 @@ use crate::scene::build::hierarchy::{check_none_lost, instance, is_speck, reach}
 use crate::scene::build::plan::is_even;
 use crate::scene::build::soft::Placed;
 use crate::scene::description::Transform;
-use crate::scene::load::material::radiance;
+use crate::scene::load::material::{radiance, reflectance};
 use crate::scene::pose::{EnvironmentChange, Pose, Vertices};
 use crate::scene::{Fingerprint, Scene};
 use glam::{DAffine3, DMat3, Vec3};
@@ -208,6 +208,33 @@ fn sphere_shines(triangle: &Triangle, even: bool, worn: &Material) -> Checked {
     Err(format!("has a lamp that is a sphere and {what}: give its mesh segments"))
 }
 
+fn material_name(scene: &Scene, index: usize) -> String {
+    match scene.names.materials.get(index).filter(|name| !name.is_empty()) {
+        Some(name) => format!("material \"{name}\""),
+        None => format!("material {index}"),
+    }
+}
+
+/// Checks what a pose says of materials, lights, sky and camera, and returns warnings of reflectances that are clamped.
+///
+/// # Errors
+/// A sentence with what cannot be.
+pub fn check_numbers(scene: &Scene, pose: &Pose) -> Checked<Vec<String>> {
+    next_materials(scene, pose)?;
+    next_lights(scene, pose)?;
+    if let Some(camera) = &pose.camera {
+        camera.build([1, 1], scene.bounds).map_err(|what| format!("camera: {what}"))?;
+    }
+    let mut warnings = Vec::new();
+    for (index, to) in &pose.materials {
+        for (value, key) in [(to.color, "color"), (to.specular, "specular"), (to.transmission, "transmission")] {
+            let what = format!("{}: {key}", material_name(scene, *index));
+            value.map(|value| reflectance(value, &what, &mut warnings)).transpose()?;
+        }
+    }
+    Ok(warnings)
+}
+
 fn next_materials(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Material>>> {
     if pose.materials.is_empty() {
         return Ok(None);
@@ -216,7 +243,7 @@ fn next_materials(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Material>>> 
     for (index, to) in &pose.materials {
         let count = materials.len();
         let m = materials.get_mut(*index).ok_or_else(|| format!("material {index} of {count}: there is none"))?;
-        *m = changed(m, to).map_err(|what| format!("material {index}: {what}"))?;
+        *m = changed(m, to).map_err(|what| format!("{}: {what}", material_name(scene, *index)))?;
     }
     Ok((materials != scene.materials).then_some(materials))
 }
@@ -241,7 +268,8 @@ fn next_lights(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Light>>> {
 }
 
 fn next_sky(sky: &Light, to: &EnvironmentChange) -> Checked<Light> {
-    let value = radiance(to.radiance.unwrap_or(sky.value)).map_err(|what| format!("environment: {what}"))?;
+    let value =
+        radiance(to.radiance.unwrap_or(sky.value), "radiance").map_err(|what| format!("environment: {what}"))?;
     let turned = match to.rotation {
         Some(degrees) if !degrees.is_finite() => return Err("environment: its rotation is no number".to_owned()),
         Some(degrees) => rotation(degrees, None)?,

@@ -266,7 +266,7 @@ pub fn has_normal_map(m: &Material) -> bool {
 pub fn emission(t: &MaterialTable) -> Result<[f32; 3], String> {
     let strength = t.emission_strength.unwrap_or(1.0);
     let emission = t.emission.map_or([f32::from(t.emission_texture.is_some()); 3], |v| v.0);
-    radiance(emission.map(|v| v * strength))
+    radiance(emission.map(|v| v * strength), "emission")
 }
 
 /// A colour that must not exceed 1; larger values are clamped with a warning.
@@ -287,11 +287,11 @@ pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Resul
 /// A colour from 0 to [`MAX_RADIANCE`].
 ///
 /// # Errors
-/// With the colour, for another one.
-pub fn radiance(color: [f32; 3]) -> Result<[f32; 3], String> {
+/// With the colour and `what` it is, for another one.
+pub fn radiance(color: [f32; 3], what: &str) -> Result<[f32; 3], String> {
     match color.iter().all(|v| (0.0..=MAX_RADIANCE).contains(v)) {
         true => Ok(color),
-        false => Err(format!("emission {color:?} is negative, NaN or above {MAX_RADIANCE:e}")),
+        false => Err(format!("{what} {color:?} is negative, NaN or above {MAX_RADIANCE:e}")),
     }
 }
 

@@ -38,7 +38,7 @@ impl Materials {
         m.base_color = reflectance(kd, &named("Kd"), warn)?;
         let or_mapped = |color: Option<[f32; 3]>, mapped: bool| color.unwrap_or([f32::from(mapped); 3]);
         let ks = reflectance(or_mapped(block.specular, block.specular_texture.is_some()), &named("Ks"), warn)?;
-        m.emission = radiance(or_mapped(block.emissive, mtl.map("map_Ke").is_some()))?;
+        m.emission = radiance(or_mapped(block.emissive, mtl.map("map_Ke").is_some()), "emission")?;
         m.opacity = block.dissolve.unwrap_or(1.0).clamp(0.0, 1.0);
         let kind = mtl_kind(mtl, m.base_color, ks, m.opacity);
         mtl_interface(&mut m, mtl, kind, ks, warn)?;
