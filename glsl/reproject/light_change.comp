@@ -15,8 +15,8 @@ layout(scalar, push_constant) uniform Push { LightChangePush push; };
 // it is, with its sign: it stands for little, and noise cancels.
 const uint LEAST_SPACING = 1u;
 
-// What has changed without noise at one path (`change` of the first level) has so in as many cells across around it: few of their paths
-// meet the narrow edge of a shadow that passes there.
+// A change without noise at one path (`change` of the first level) counts in a square of so many cells across around it, since few of
+// their paths meet the narrow edge of a shadow that passes there.
 const int CERTAIN_ACROSS = 5;
 
 void main() {

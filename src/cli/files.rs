@@ -223,7 +223,7 @@ pub fn check_distinct(outputs: &[(&str, &Path)], inputs: &[(&str, &Path)]) -> Re
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn check_not_of_scene(outputs: &[(String, PathBuf)], scene: &Scene) -> Result<()> {
+pub fn check_not_of_scene(outputs: &[(&str, PathBuf)], scene: &Scene) -> Result<()> {
     let existing: Vec<_> = outputs.iter().filter(|(_, path)| path.exists() && !output::is_special(path)).collect();
     if existing.is_empty() {
         return Ok(());

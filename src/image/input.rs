@@ -46,14 +46,16 @@ pub fn is_of_another_format(path: &Path) -> bool {
     use ImageFormat::{Hdr, Jpeg, OpenExr, Png};
     let has_mark = ImageFormat::from_path(path).is_ok_and(|format| matches!(format, Png | Jpeg | Hdr | OpenExr));
     let others = path.extension().is_some() && !has_mark;
-    let head = || File::open(path).and_then(|mut file| head(&mut file));
-    others && head().is_ok_and(|head| !super::is_image(&head))
+    others && head_of(path).is_ok_and(|head| !super::is_image(&head))
 }
 
 /// Whether an image holds integers, by its first bytes; false for what cannot be read.
 pub fn holds_integers(path: &Path) -> bool {
-    let head = || File::open(path).and_then(|mut file| head(&mut file));
-    head().is_ok_and(|head| !super::holds_floats(&head))
+    head_of(path).is_ok_and(|head| !super::holds_floats(&head))
+}
+
+fn head_of(path: &Path) -> std::io::Result<Vec<u8>> {
+    head(&mut File::open(path)?)
 }
 
 fn head(file: &mut impl Read) -> std::io::Result<Vec<u8>> {

@@ -76,7 +76,7 @@ gpu_structs! {
         triangles: uint,
     }
 
-    /// Of a cell, a square of the film: one path, as the light was before the scene changed. 1 texel.
+    /// Of a cell, a square of the film: one path, as the light was before the scene changed. 2 texels.
     struct Probe {
         /// Radiance, W/(m^2 sr).
         light: vec3,

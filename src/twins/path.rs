@@ -104,6 +104,19 @@ struct Seen {
     albedo: Vec3,
 }
 
+impl Seen {
+    /// Notes a surface that a path of this throughput leaves.
+    fn note(&mut self, p: &Shade, throughput: Vec3) {
+        let is_smooth = bsdf_is_delta(&p.bsdf);
+        if self.scattered == 0 && !self.chosen {
+            self.chosen = is_smooth && bsdf_chooses(&p.bsdf);
+            let albedo = if self.chosen { Vec3::ONE } else { bsdf_albedo(&p.bsdf, p.view.wo.z) };
+            self.albedo = throughput.min(Vec3::ONE) * albedo;
+        }
+        self.scattered += u32::from(!is_smooth);
+    }
+}
+
 /// Light by the kernel's sums: what is soft is added to indirect light at the path's end.
 #[derive(Default)]
 struct Sum {
@@ -296,12 +309,7 @@ impl Tracer<'_> {
             }
             let p = self.shade(s, path.direction, pair, from);
             let smooth_here = bsdf_is_delta(&p.bsdf);
-            if seen.scattered == 0 && !seen.chosen {
-                seen.chosen = smooth_here && bsdf_chooses(&p.bsdf);
-                let albedo = if seen.chosen { Vec3::ONE } else { bsdf_albedo(&p.bsdf, p.view.wo.z) };
-                seen.albedo = path.throughput.min(Vec3::ONE) * albedo;
-            }
-            seen.scattered += u32::from(!smooth_here);
+            seen.note(&p, path.throughput);
             let soft = self.effects.soft_light;
             let ends = sharp_only && seen.scattered > u32::from(!soft);
             if self.frame.path.light_count > 0 && !smooth_here {

@@ -365,6 +365,10 @@ fn numbers_of_keys_are_checked_when_the_scene_is_loaded() {
         Scene::parse(Path::new("s.toml"), &text).unwrap().scene.warnings
     };
     assert_eq!(warnings(1.0), Vec::<String>::new());
+    // Of metallic materials it is a factor.
+    let tin = "[[material]]\nname = \"tin\"\ntype = \"metallic-roughness\"\n".to_owned();
+    let text = STAGE.to_owned() + &tin + &at_two("material = \"tin\"", "specular", 1.0, 2.0);
+    assert_eq!(Scene::parse(Path::new("s.toml"), &text).unwrap().scene.warnings, Vec::<String>::new());
     let found = warnings(1.5);
     assert_eq!(
         found,

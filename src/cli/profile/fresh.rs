@@ -39,10 +39,8 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     let denoise = args.denoise.filter(|method| !method.is_none() || settings.indirect_stride > 1);
     let filter = denoise.map(row).transpose()?;
     let scene = file.load()?.scene;
-    check_not_of_scene(
-        &args.outputs().map(|(option, path)| (option.to_owned(), path.to_owned())).collect::<Vec<_>>(),
-        &scene,
-    )?;
+    let outputs: Vec<_> = args.outputs().map(|(option, path)| (option, path.to_owned())).collect();
+    check_not_of_scene(&outputs, &scene)?;
     args.common.warn(&scene.warnings);
     if let Some(old) = old {
         check_beside(old, &scene, &settings, filter)?;

@@ -38,7 +38,7 @@ pub fn check(args: &Args) -> Result<()> {
 }
 
 /// What is written beside images, by its option.
-fn beside_images(args: &Args) -> impl Iterator<Item = (&str, &Path)> {
+fn beside_images(args: &Args) -> impl Iterator<Item = (&'static str, &Path)> {
     let maps = args.heatmap.iter().map(|path| ("--heatmap", path.as_path()));
     let traces = args.profile.iter().map(|path| ("--profile", path.as_path()));
     let plans = planned::to_write(args).map(|path| ("--plan", path));
@@ -54,10 +54,10 @@ pub fn check_with(args: &Args, scene: &Scene) -> Result<()> {
 }
 
 /// All files that are written, by their options.
-pub fn all(args: &Args) -> Vec<(String, PathBuf)> {
+pub fn all(args: &Args) -> Vec<(&'static str, PathBuf)> {
     let option = if args.outputs.is_empty() { "the default output" } else { "-o" };
-    let images = args.output_files().into_iter().map(|path| (option.to_owned(), path));
-    images.chain(beside_images(args).map(|(option, path)| (option.to_owned(), path.to_owned()))).collect()
+    let images = args.output_files().into_iter().map(|path| (option, path));
+    images.chain(beside_images(args).map(|(option, path)| (option, path.to_owned()))).collect()
 }
 
 /// Writes those of the items that are files, and brings the checkpoint up to date or removes it: where an image has all layers, or

@@ -159,7 +159,7 @@ impl Args {
 
     /// What is written, once the scene is loaded.
     fn check_with(&self, frames: &Range<u32>, scene: &Scene) -> Result<()> {
-        let mut files: Vec<_> = self.preview.iter().map(|path| ("--preview".to_owned(), path.clone())).collect();
+        let mut files: Vec<_> = self.preview.iter().map(|path| ("--preview", path.clone())).collect();
         for number in self.numbers(frames)? {
             files.extend(outputs::all(&self.of_frame(number)?));
         }

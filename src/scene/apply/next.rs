@@ -2,7 +2,7 @@
 use super::material::changed;
 use crate::error::Checked;
 use crate::layout::{
-    Instance, LIGHT_ENVIRONMENT, Light, MATERIAL_MASKED, Material, NONE, SPHERE, SPHERE_INWARD, Triangle,
+    BSDF_METALLIC, Instance, LIGHT_ENVIRONMENT, Light, MATERIAL_MASKED, Material, NONE, SPHERE, SPHERE_INWARD, Triangle,
 };
 use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
@@ -227,7 +227,9 @@ pub fn check_numbers(scene: &Scene, pose: &Pose) -> Checked<Vec<String>> {
     }
     let mut warnings = Vec::new();
     for (index, to) in &pose.materials {
-        for (value, key) in [(to.color, "color"), (to.specular, "specular"), (to.transmission, "transmission")] {
+        // That of metallic materials is a factor, which may be more.
+        let specular = to.specular.filter(|_| scene.materials[*index].kind != BSDF_METALLIC);
+        for (value, key) in [(to.color, "color"), (specular, "specular"), (to.transmission, "transmission")] {
             let what = format!("{}: {key}", material_name(scene, *index));
             value.map(|value| reflectance(value, &what, &mut warnings)).transpose()?;
         }

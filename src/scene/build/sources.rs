@@ -152,7 +152,7 @@ impl<'a> Sources<'a> {
 
     /// Path of a mesh's file.
     pub fn file_of(&self, table: &MeshTable) -> Option<PathBuf> {
-        Some(self.directory().join(table.file.as_ref()?.to_string_lossy().replace('\\', "/")))
+        Some(self.beside(table.file.as_ref()?))
     }
 
     /// Index of a `[[material]]`.
