@@ -62,10 +62,12 @@ impl<'a> Recorder<'a> {
     /// - No buffer that it uses is read or written from the submission until it is complete: by [`Buffer::read`],
     ///   [`Buffer::read_range`] or [`Buffer::write`], by [`Gpu::run`], by what calls any of these, or by another such submission,
     ///   unless that goes to the same queue or a semaphore orders the two. What calls them is all that returns what the device has
-    ///   found or gives the device what the host has: of a [`Renderer`](crate::render::Renderer) `picture`, `counters`,
+    ///   found or gives the device what the host has, such as of a [`Renderer`](crate::render::Renderer) `picture`, `counters`,
     ///   `broken_samples`, `apportionment`, `listed`, `priorities_of`, `carriage`, `resume`, `take_up`, `add_history`,
-    ///   `keep_history`, `begin_frame`, `look_up` and `run`, every function of a [`Job`](crate::render::Job), and of a
-    ///   [`Denoiser`](crate::denoise::Denoiser) `scales`. All of these are safe functions, and nothing but this promise keeps them
+    ///   `keep_history`, `begin_frame`, `look_up` and `run`, every function of a [`Job`](crate::render::Job), of a
+    ///   [`Denoiser`](crate::denoise::Denoiser) `scales`, and [`film::read_back`](crate::render::film::read_back),
+    ///   [`Noisy`](crate::denoise::Noisy), [`Filtered`](crate::denoise::Filtered) and
+    ///   [`Scales`](crate::denoise::filter::Scales) of what that submission uses. All of these are safe functions, and nothing but this promise keeps them
     ///   from memory that the device is writing.
     /// - The recorder is dropped before the command buffer is ended.
     ///

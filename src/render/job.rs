@@ -100,6 +100,10 @@ impl<'a> Job<'a> {
             let what = "a job has more than one of checkpoint, pixel and carries: each begins with samples of its own";
             return Err(Error::Usage(what.to_owned()));
         }
+        let pixels = renderer.settings().pixels();
+        if let Some(pixel) = self.pixel.filter(|&pixel| pixel as usize >= pixels) {
+            return Err(Error::Usage(format!("pixel {pixel} is outside of the film, which has {pixels} pixels")));
+        }
         if let Some(checkpoint) = self.checkpoint {
             renderer.resume(frame, checkpoint)?;
         }

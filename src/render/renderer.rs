@@ -211,7 +211,8 @@ impl Renderer {
     /// Records one step.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for a step of another renderer, [`crate::error::Error::Device`].
+    /// [`crate::error::Error::Usage`] for a step that this renderer has no room for, [`crate::error::Error::Device`]. Other steps of
+    /// another renderer are not told apart and make a wrong picture.
     pub fn record(&self, rec: &mut Recorder, step: &Step) -> Result<()> {
         if !self.cut().has_room_for(step) {
             return Err(Error::Usage(format!("{step:?} is of another renderer: take those of Renderer::steps")));

@@ -90,6 +90,10 @@ fn a_job_begins_in_one_way() {
     let job = Job { pixel: Some(5), carries: true, ..Job::new(&renderer) };
     let error = job.run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap_err().to_string();
     assert!(error.contains("more than one of checkpoint, pixel and carries"), "{error}");
+    let pixels = scene.settings.pixels();
+    let job = Job { pixel: Some(pixels as u32), ..Job::new(&renderer) };
+    let error = job.run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap_err().to_string();
+    assert!(error.contains(&format!("pixel {pixels} is outside of the film")), "{error}");
     assert_silent(&gpu);
 }
 

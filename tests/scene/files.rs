@@ -85,6 +85,17 @@ fn what_is_missing_is_said_once() {
 }
 
 #[test]
+fn what_is_repaired_in_a_mesh_is_told_once_for_all_instances() {
+    let folder = folder(&[("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")]);
+    let instances: String =
+        (0..3).map(|x| format!("[[instance]]\nmesh = \"m\"\ntransform = {{ translate = [{x}, 0, 0] }}\n")).collect();
+    let text = format!("[environment]\n[[mesh]]\nname = \"m\"\nfile = \"a.obj\"\n{instances}");
+    let scene = Scene::parse(&folder.path().join("s.toml"), &text).unwrap().scene;
+    assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
+    assert!(scene.warnings[0].contains("1 without vertex normals"), "{:?}", scene.warnings);
+}
+
+#[test]
 fn grey_is_not_spoken_of_where_the_scene_gives_a_material() {
     let obj = format!("mtllib no.mtl\n{TRIANGLE}usemtl a\nf 1//1 2//1 3//1\n");
     let folder = folder(&[("a.obj", &obj)]);

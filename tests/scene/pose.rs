@@ -172,6 +172,9 @@ fn numbers_of_materials_are_those_of_their_tables() {
     };
     scene.apply(&pose(1.0)).unwrap();
     assert_eq!(scene.materials, before);
+    let sign = MaterialChange { emission: Some([0.0, 5.0, 0.0]), ..MaterialChange::default() };
+    scene.apply(&Pose { materials: vec![(1, sign)], ..Pose::default() }).unwrap();
+    assert_eq!(scene.materials, before, "what is unlit shows its color alone, as of its table");
     scene.apply(&pose(0.5)).unwrap();
     let halved = |i: usize| before[i].specular.map(|v| 0.5 * v);
     assert_eq!([scene.materials[0].specular, scene.materials[2].specular], [halved(0), halved(2)], "control");

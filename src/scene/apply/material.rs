@@ -28,7 +28,8 @@ pub fn changed(m: &Material, to: &MaterialChange) -> Result<Material, String> {
     if let Some(transmission) = to.transmission {
         m.transmission = tint(transmission, "transmission")?;
     }
-    if let Some(emission) = to.emission {
+    // What is unlit shows its color in place of light of its own.
+    if let Some(emission) = to.emission.filter(|_| m.flags & MATERIAL_UNLIT == 0) {
         m.emission = radiance(emission, "emission")?;
     }
     if let Some(alpha) = to.alpha {

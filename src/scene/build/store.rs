@@ -16,7 +16,7 @@ use crate::scene::load::obj_part::Part;
 use crate::scene::{BYTES_OF_TRIANGLE, MAX_COORDINATE, Scene};
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 /// Triangles that a thread places at a time, and how many such parts are placed before they are put together.
@@ -57,13 +57,14 @@ pub fn store(sources: &mut Sources, plan: &Plan, scene: &Scene, geometry: &mut G
     let depths = split::depths(&counts);
     // At once: each of many small meshes would move all before it.
     memory::reserve(sources.path.display(), &mut geometry.triangles, triangles as usize)?;
+    let read = Read::new(sources);
     let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new(), soft: None }];
     for (i, job) in jobs.into_iter().enumerate() {
         let start = geometry.triangles.len();
         let baked = i < plan.baked.len();
         let first = if baked { stored[0].objects.len() as u32 } else { 0 };
         let (objects, soft) =
-            Addition::new(sources, job, first, (lamps, depths[i]))?.add(sources, geometry, last[i])?;
+            Addition::new(sources, &read, job, first, (lamps, depths[i]))?.add(sources, geometry, last[i])?;
         let end = geometry.triangles.len();
         if baked {
             stored[0].objects.extend(objects);
@@ -73,7 +74,37 @@ pub fn store(sources: &mut Sources, plan: &Plan, scene: &Scene, geometry: &mut G
         }
     }
     sources.files.clear();
+    // What is stored once for each of its instances is repaired as often.
+    let mut told = HashSet::new();
+    sources.library.warnings.retain(|warning| told.insert(warning.clone()));
     Ok(stored)
+}
+
+/// What the materials of a scene read of all meshes, and which of these show materials of their own. Found once, for many meshes.
+struct Read<'a> {
+    /// Whether some material reads coordinates of textures, or second ones, or tangents.
+    uvs: bool,
+    second: bool,
+    tangents: bool,
+    /// By the names of meshes that instances place: whether each of these gives a material.
+    worn: HashMap<&'a str, bool>,
+}
+
+impl<'a> Read<'a> {
+    fn new(sources: &Sources<'a>) -> Self {
+        let materials = &sources.library.materials;
+        let stretched = materials.list.iter().any(|m| m.anisotropy != 0.0);
+        let mut worn = HashMap::new();
+        for instance in &sources.description.instance {
+            *worn.entry(instance.mesh.as_str()).or_insert(true) &= instance.material.is_some();
+        }
+        Self {
+            uvs: stretched || !materials.textures.is_empty(),
+            second: materials.textures.any_second(),
+            tangents: stretched || materials.list.iter().any(has_normal_map),
+            worn,
+        }
+    }
 }
 
 /// How many triangles with a picture of emission a mesh shows that can be split: those of one that moves are counted by who moves it.
@@ -170,23 +201,17 @@ struct Addition<'a, 'l> {
 }
 
 impl<'a, 'l> Addition<'a, 'l> {
-    fn new(sources: &Sources<'a>, job: &Job, first: u32, lamps: (Lamps<'l>, u32)) -> Result<Self> {
+    fn new(sources: &Sources<'a>, read: &Read, job: &Job, first: u32, lamps: (Lamps<'l>, u32)) -> Result<Self> {
         let table = &sources.description.mesh[job.mesh];
         // Meshes from memory without normals are flat on purpose: there all vertices have one, or none has.
         let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
-        let stretched = sources.library.materials.list.iter().any(|m| m.anisotropy != 0.0);
-        let uvs = stretched || !sources.library.materials.textures.is_empty();
+        let &Read { uvs, second, tangents, .. } = read;
         let (affine, flat, keep) = (job.affine, table.flat || meant, table.moving);
         let placement = Placement { affine, flat, flip: table.flip_normals, uvs, keep };
-        let materials = &sources.library.materials;
-        let second = materials.textures.any_second();
-        let tangents = stretched || materials.list.iter().any(has_normal_map);
         let place = format!("mesh \"{}\"", mesh_name(table));
         let material = override_of(sources, job)?;
         let is_obj = table.file.as_deref().is_some_and(|file| Format::of(file) == Format::Obj);
-        let mut instances =
-            sources.description.instance.iter().filter(|i| table.name.as_ref() == Some(&i.mesh)).peekable();
-        let all_worn = instances.peek().is_some() && instances.all(|i| i.material.is_some());
+        let all_worn = table.name.as_deref().is_some_and(|name| read.worn.get(name) == Some(&true));
         let colors = !(is_obj && (material.is_some() || all_worn));
         Ok(Self { job: *job, table, place, material, placement, first, second, colors, tangents, lamps })
     }

@@ -101,6 +101,9 @@ impl Camera {
     /// Half of the film's width and height: at distance 1, or anywhere if rays are parallel.
     fn half_film(&self, [width, height]: [u32; 2]) -> Result<(f64, f64), String> {
         let half = self.half_edge()?;
+        if width == 0 || height == 0 {
+            return Err(format!("a film of {width}x{height} has no pixel"));
+        }
         let aspect = f64::from(width) / f64::from(height);
         let along_x = match self.fov_axis {
             FovAxis::X => true,
@@ -189,6 +192,12 @@ fn finite(position: DVec3) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_film_without_pixels_is_refused() {
+        let refused = |size| Camera::default().build(size, Default::default()).unwrap_err();
+        assert_eq!([[0, 8], [8, 0]].map(refused), ["a film of 0x8 has no pixel", "a film of 8x0 has no pixel"]);
+    }
 
     #[test]
     fn looks_at_its_target_with_a_vertical_fov() {
