@@ -97,6 +97,20 @@ pub struct Policy {
 /// All policies, in the order of the help.
 pub const POLICIES: &[&Policy] = &[&uniform::ROW, &geometry::ROW, &variance::ROW, &both::ROW, &threshold::ROW];
 
+impl Policy {
+    /// Whether it reads the setting of this option. What no policy in particular reads is read by all.
+    pub fn reads(&self, option: &str) -> bool {
+        let readers: &[&Self] = match option {
+            "min-spp" | "max-spp" | "rounds" => return self.placing != Placing::Even,
+            "window" | "sigma-normal" | "sigma-position" => &[&geometry::ROW, &both::ROW],
+            "luminance-floor" => &[&variance::ROW, &both::ROW, &threshold::ROW],
+            "filtered" => &[&both::ROW],
+            _ => return true,
+        };
+        readers.contains(&self)
+    }
+}
+
 /// Finds a policy by its name.
 pub fn policy(name: &str) -> Option<&'static Policy> {
     POLICIES.iter().copied().find(|row| row.name == name)

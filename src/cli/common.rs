@@ -56,6 +56,14 @@ impl Common {
         }
     }
 
+    /// Warns of options that were given and change nothing, because `name`, the policy or filter that was chosen, does not read them.
+    pub fn warn_of_unread(&self, given: &[String], name: &str, reads: impl Fn(&str) -> bool) {
+        let unread = given.iter().filter(|option| !reads(option));
+        self.warn(
+            &unread.map(|option| format!("--{option} changes nothing: {name} does not read it")).collect::<Vec<_>>(),
+        );
+    }
+
     /// Prints what a command found: `found` as JSON or `text`, or nothing.
     ///
     /// # Errors

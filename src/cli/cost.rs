@@ -6,12 +6,12 @@ mod output;
 mod points;
 
 use super::files::scene_name;
-use super::{Exit, complain, fail_on_messages, interrupt};
+use super::{Exit, complain, fail_on_messages, interrupt, quoted};
 use crate::cost::document::SceneInfo;
 use crate::cost::{Document, Ended, Images, JudgedFrame, Plan, Watch, key, measure, others, reference};
 use crate::error::{Error, Result};
 use crate::gpu::{self, Gpu};
-use crate::scene::{Scene, SceneFile};
+use crate::scene::Scene;
 pub use options::Args;
 use output::{Folder, Shown, missing, text};
 use points::Points;
@@ -43,9 +43,10 @@ fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> R
     let [width, height] = [base.width, base.height];
     let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base)));
     let reference = args.reference.as_deref().map(given).transpose()?;
-    let settings = SceneFile::open(path)?.settings()?;
+    let settings = args.choices.open(path)?.settings()?;
     let judged = motion.as_ref().map(|motion| motion.judged);
-    let command = |candidate| points::command(path, judged, &settings, candidate, gpu.traces_by_ray_query());
+    let scene_words = quoted(&path.display().to_string()) + &args.choices.words();
+    let command = |candidate| points::command(&scene_words, judged, &settings, candidate, gpu.traces_by_ray_query());
     Ok(Plan {
         scene: scene_info(path, [width, height], judged),
         commands: candidates.iter().map(command).collect(),
@@ -124,7 +125,10 @@ fn finish(
         return Ok(Exit::Interrupted);
     }
     let (document, images) = (&document, &images);
-    let written = folder.write(document, images, ended == Ended::Complete);
+    if document.complete {
+        folder.set_aside_other(&document.measurement.key)?;
+    }
+    let written = folder.write(document, images, document.complete);
     args.common.report(&Report { document, warnings }, || text(document, &written))?;
     folder.check()?;
     match ended {

@@ -1,6 +1,8 @@
 //! `tallow explain`: lists the effects that a scene needs and measures what each of them costs.
 mod text;
 
+use super::choices::Choices;
+use super::overrides::Overrides;
 use super::{Exit, complain, print, print_json};
 use crate::cost::document::Estimate;
 use crate::cost::interval;
@@ -9,7 +11,7 @@ use crate::gpu::{DeviceKind, DeviceOptions, FrameResources, Gpu, total_ms};
 use crate::layout::*;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Job, Outputs, Renderer, bytes_in_flight, called_for};
-use crate::scene::{self, Loaded, Scene, SceneFile};
+use crate::scene::{self, Loaded, Scene};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -19,7 +21,7 @@ use text::text;
 
 /// List every effect: on or off, what calls for it, and what it costs
 ///
-/// Times are those of one sample per pixel of the film, made smaller if it has more than 128 x 128 pixels, or 256 x 256 where a
+/// Options override the settings of the scene file. Times are those of one sample per pixel of the film, made smaller if it has more than 128 x 128 pixels, or 256 x 256 where a
 /// graphics card renders. Bytes are those of the film in its own size.
 #[derive(clap::Args)]
 pub struct Args {
@@ -28,6 +30,9 @@ pub struct Args {
     /// Effects to measure [default: all of them]
     #[arg(value_name = "EFFECT")]
     pub effects: Vec<String>,
+    /// What of a glTF file is seen.
+    #[command(flatten)]
+    pub choices: Choices,
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
@@ -37,6 +42,9 @@ pub struct Args {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Replace the scene's own settings.
+    #[command(flatten)]
+    pub overrides: Overrides,
 }
 
 /// What `--json` prints.
@@ -92,9 +100,12 @@ pub fn run(args: &Args) -> Result<Exit> {
     if !args.no_measure && !is_cold() {
         return run_cold();
     }
-    let mut file = SceneFile::open(&args.scene)?;
+    let mut file = args.choices.open(&args.scene)?;
     file.stays_still();
-    let scene = file.load()?;
+    let mut settings = file.settings()?;
+    args.overrides.apply(&mut settings);
+    settings.validate()?;
+    let scene = file.load()?.with(|own| *own = settings);
     let warnings = scene.warnings.clone();
     if !args.json {
         warnings.iter().for_each(|w| complain(&format!("warning: {w}")));

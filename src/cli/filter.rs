@@ -113,6 +113,7 @@ pub struct Summary {
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     check_filter(args)?;
+    args.common.warn_of_unread(&args.overrides.given.given(), args.filter.name(), |option| args.filter.reads(option));
     let file = Unread::open(&args.image)?;
     let gpu = args.common.open(Tracing::Auto)?;
     check_room(args, &gpu, &file.claim)?;

@@ -1,5 +1,6 @@
 //! The command line. Each subcommand has a file of its own; this one parses, dispatches and prints.
 pub mod checkpoint;
+pub mod choices;
 pub mod common;
 pub mod compare;
 pub mod cost;
@@ -55,7 +56,7 @@ enum Command {
     Compare(Box<compare::Args>),
     Cost(Box<cost::Args>),
     Merge(merge::Args),
-    Explain(explain::Args),
+    Explain(Box<explain::Args>),
     Profile(Box<profile::Args>),
     Devices(devices::Args),
 }

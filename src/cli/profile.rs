@@ -2,6 +2,7 @@
 mod fresh;
 mod text;
 
+use super::choices::Choices;
 use super::common::Common;
 use super::files::{Files, Item, check_distinct};
 use super::overrides::Overrides;
@@ -49,6 +50,9 @@ pub struct Args {
     /// Who finds what rays meet [default: auto]
     #[arg(long, value_enum)]
     pub tracing: Option<Tracing>,
+    /// What of a glTF file is seen.
+    #[command(flatten)]
+    pub choices: Choices,
     /// The device, and what is printed.
     #[command(flatten)]
     pub common: Common,
@@ -112,9 +116,9 @@ impl Args {
 
     /// Whether an option is given that only frames which run now can follow.
     fn says_how_to_render(&self) -> bool {
-        let Self { frames, denoise, common: Common { device, validation, .. }, tracing, overrides, .. } = self;
+        let Self { frames, denoise, common: Common { device, validation, .. }, tracing, choices, overrides, .. } = self;
         let options = [frames.is_some(), denoise.is_some(), device.is_some(), tracing.is_some(), *validation];
-        options.contains(&true) || *overrides != Overrides::default()
+        options.contains(&true) || *choices != Choices::default() || *overrides != Overrides::default()
     }
 }
 
@@ -125,8 +129,8 @@ fn check_outputs(args: &Args) -> Result<()> {
     }
     if args.is_earlier() && args.says_how_to_render() {
         return Err(Error::Usage(format!(
-            "{}: of an earlier profile no frames run: leave out --frames, --denoise, --device, --tracing, --validation and settings \
-             such as --spp, or give the scene",
+            "{}: of an earlier profile no frames run: leave out --frames, --denoise, --device, --tracing, --validation, --camera, \
+             --clip and settings such as --spp, or give the scene",
             args.scene.display()
         )));
     }

@@ -7,6 +7,7 @@ mod summary;
 mod taken;
 
 use super::checkpoint;
+use super::choices::Choices;
 use super::common::{Common, PngOptions};
 use super::files::Files;
 use super::overrides::Overrides;
@@ -19,8 +20,8 @@ use crate::image;
 use crate::memory;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Checkpoint, Job, Outputs, Renderer, all_effects, film};
-use crate::scene::{Loaded, Scene, SceneFile, light_and_camera_effects};
-pub use shot::{CHOICES, FRAME};
+use crate::scene::{Loaded, Scene, light_and_camera_effects};
+pub use shot::FRAME;
 pub use spans::Spans;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -83,12 +84,9 @@ pub struct Args {
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
           conflicts_with_all = ["resume", "checkpoint", "denoise"])]
     pub pixel: Option<[u32; 2]>,
-    /// Look through this camera of a glTF file [default: its first one, or one that frames it]
-    #[arg(long, value_name = "NAME")]
-    pub camera: Option<String>,
-    /// Play only this animation of a glTF file [default: all that do not move the same as an earlier one]
-    #[arg(long, value_name = "NAME")]
-    pub clip: Option<String>,
+    /// What of a glTF file is seen.
+    #[command(flatten)]
+    pub choices: Choices,
     /// Count rays and visited nodes; those that ray queries visit, nobody counts
     #[arg(long)]
     pub counters: bool,
@@ -145,6 +143,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     outputs::check_with(args, &scene)?;
     let asked = settings.clone();
     let settings = plan.as_ref().map_or(Ok(settings), |plan| planned::settings(args, plan, &scene))?;
+    warn_of_unread(args, &settings);
     let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
     args.common.warn(&scene.warnings);
     let filtered = earlier.as_ref().and_then(|earlier| earlier.filtered.as_ref());
@@ -195,10 +194,7 @@ pub fn run(args: &Args) -> Result<Exit> {
 /// # Errors
 /// Of usage and input.
 pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
-    let mut file = SceneFile::open_clip(&args.scene, args.clip.as_deref())?;
-    if let Some(name) = &args.camera {
-        file.look_through(name)?;
-    }
+    let mut file = args.choices.open(&args.scene)?;
     file.stays_still();
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
@@ -250,6 +246,15 @@ pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Re
         filter::check_size(gpu, size, filter::GUIDE_TEXELS)?;
     }
     Ok(())
+}
+
+/// Tells which settings the policy, that of the scene file or of the options, does not read. A plan chooses the policy itself.
+pub fn warn_of_unread(args: &Args, settings: &Settings) {
+    let policy = settings.allocate.policy;
+    if args.time.is_some() || args.error.is_some() {
+        return;
+    }
+    args.common.warn_of_unread(&args.overrides.allocate.given(), policy.name, |option| policy.reads(option));
 }
 
 /// Of light that is not traced for every pixel a picture can be made by some filters alone.

@@ -64,7 +64,7 @@ impl<'a> Moving<'a> {
     /// # Errors
     /// Those of [`Animation::at`].
     pub fn new(scene: &Scene, motion: &'a Motion) -> Result<Self> {
-        Ok(Self { scene: scene.clone(), motion, moves: Moves::of(&motion.animation)? })
+        Ok(Self { scene: scene.clone(), motion, moves: Moves::of(&motion.animation) })
     }
 
     /// The frames that a run renders; the last is judged.

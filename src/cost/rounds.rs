@@ -73,7 +73,10 @@ impl<R: Runs> Measuring<'_, R> {
             (false, true) => Ended::Stopped,
             (false, false) => Ended::Budget,
         };
-        let document = document(&self.outline, self.points, reference, ended == Ended::Complete);
+        // What failed is tried again by the same command.
+        let complete =
+            ended == Ended::Complete && !self.points.iter().any(|point| point.failed.is_some() && !point.is_other);
+        let document = document(&self.outline, self.points, reference, complete);
         (document, images(self.pictures, reference), ended)
     }
 

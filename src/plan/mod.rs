@@ -15,6 +15,7 @@ mod probe;
 
 pub use pacer::FramePacer;
 
+use crate::allocate::Placing;
 use crate::denoise::filter::{self, Method};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -178,11 +179,11 @@ fn forecasts(levels: &[Level], methods: &[Method], most: u32) -> Vec<Forecast> {
     (0..methods.len()).map(|method| Forecast::new(levels, method, most)).collect()
 }
 
-/// Samples per pixel that a render has at most, on average.
+/// Samples per pixel that a render has at most, on average. Where samples are chosen, `max_spp` is no limit of theirs.
 fn most_samples(settings: &Settings) -> u32 {
     match settings.allocate.max_spp {
-        0 => Settings::MAX_SPP,
-        max => max,
+        max if max > 0 && settings.allocate.policy.placing != Placing::Chosen => max,
+        _ => Settings::MAX_SPP,
     }
 }
 
@@ -299,6 +300,17 @@ mod tests {
         let of = |spp, gpu_ms, relmse| Expected { denoise: None, spp, gpu_ms, relmse };
         let first = |target| by_cost(target, vec![of(1, 2.0, 0.3), of(2, 1.0, 0.2), of(3, 3.0, 0.1)])[0].spp;
         assert_eq!([first(Target::GpuMs(3.0)), first(Target::RelMse(0.3))], [3, 2]);
+    }
+
+    #[test]
+    fn rounds_until_chance_decides_are_no_limit_of_samples() {
+        let most = |name: &str, max_spp| {
+            let mut settings = Settings::default();
+            settings.allocate.policy = crate::allocate::policy(name).unwrap();
+            settings.allocate.max_spp = max_spp;
+            most_samples(&settings)
+        };
+        assert_eq!([most("both", 8), most("both", 0), most("threshold", 8)], [8, Settings::MAX_SPP, Settings::MAX_SPP]);
     }
 
     #[test]

@@ -76,6 +76,11 @@ impl Entry {
     }
 }
 
+/// Whether a value says something: that a switch is off is what not giving it says.
+pub fn is_given<T: Value>(value: &T) -> bool {
+    !T::IS_SWITCH || value.text() == true.to_string()
+}
+
 /// Checks every setting against its range.
 ///
 /// # Errors

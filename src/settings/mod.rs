@@ -108,6 +108,20 @@ macro_rules! settings {
             }
 
             impl $Part {
+                /// Names of the options of the settings that are given; a switch that is off is not.
+                #[allow(dead_code, reason = "only of some parts it is asked")]
+                pub fn given(&self) -> Vec<String> {
+                    let own = [
+                        vec![$(
+                            self.$name
+                                .filter(|value| $crate::settings::entry::is_given(value))
+                                .map(|_| stringify!($name).replace('_', "-")),
+                        )*],
+                        $(self.$group.given().into_iter().map(Some).collect(),)*
+                    ];
+                    own.into_iter().flatten().flatten().collect()
+                }
+
                 /// Replaces the settings that are given.
                 pub fn apply(&self, settings: &mut $Whole) {
                     $(

@@ -266,9 +266,16 @@ fn a_point_that_fails_is_told_and_the_others_are_measured() {
     let output = limited.args(["--variant", "--min-spp 8 --max-spp 4"]).output().unwrap();
     let printed = text(&output, 6);
     assert!(printed.contains("failed: both, min-spp 8 --max-spp 4, 4 spp: min-spp is 8"), "{printed}");
-    let document = document(&folder, "all/cost.json");
-    assert!(document.complete && point(&document, "both, 4 spp").runs.len() == 2);
-    assert!(document.points[1].failed.is_some() && document.points[1].runs.is_empty());
+    let read = || document(&folder, "all/cost.json");
+    let found = read();
+    assert!(!found.complete && point(&found, "both, 4 spp").runs.len() == 2, "what failed may be tried again");
+    assert!(found.points[1].failed.is_some() && found.points[1].runs.is_empty());
+    text(&limited.output().unwrap(), 6);
+    assert_eq!(read().points[0].runs, found.points[0].runs);
+    let mut none =
+        within(&folder, &format!("cost {} {FILM} --allocate uniform --denoise none --spp 4 -o all", scene()));
+    complains(&none.args(["--with", "--max-spp 1"]).output().unwrap(), 2, &["max-spp is 1: the policy uniform"]);
+    assert_eq!(read().points[0].runs, found.points[0].runs);
 }
 
 #[test]

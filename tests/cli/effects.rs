@@ -29,6 +29,37 @@ fn primary_hits_are_found_only_for_files_that_keep_them() {
 }
 
 #[test]
+fn explain_takes_the_settings_of_a_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let explain = |words: &[&str]| tallow(&folder, &[&["explain", BOX, "adaptive", "--no-measure"], words].concat());
+    assert!(stdout(&explain(&[])).contains("off"));
+    let placed = stdout(&explain(&["--allocate", "both"]));
+    assert!(placed.contains("on") && placed.contains("allocate both"), "{placed}");
+    complains(&explain(&["--width", "0"]), 2, &["width is 0"]);
+    for command in ["explain", "profile", "cost", "render", "sequence"] {
+        complains(&tallow(&folder, &[command, BOX, "--camera", "left"]), 2, &["camera \"left\" is not there"]);
+        complains(&tallow(&folder, &[command, BOX, "--clip", "walk"]), 2, &["clip \"walk\" is not there"]);
+    }
+}
+
+#[test]
+fn options_that_change_nothing_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let warned = |words: &str| {
+        let output = tallow(&folder, &words.split_whitespace().collect::<Vec<_>>());
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let small = format!("render {BOX} --width 8 --height 8 --spp 2 -o a.exr");
+    assert_eq!(warned(&format!("{small} --window 3")), "warning: --window changes nothing: uniform does not read it\n");
+    assert_eq!(warned(&format!("{small} --window 3 --allocate both")), "");
+    let filter = "filter a.exr -o b.exr --filter";
+    let told = "warning: --levels changes nothing: bilateral does not read it\n";
+    assert_eq!(warned(&format!("{filter} bilateral --levels 3 --radius 4")), told);
+    assert_eq!(warned(&format!("{filter} atrous --levels 3 --conserve-energy")), "");
+}
+
+#[test]
 fn explain_tells_what_effects_cost() {
     let folder = tempfile::tempdir().unwrap();
     // Two samples of each of 128 x 128 pixels are in flight at a time.

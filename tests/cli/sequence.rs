@@ -325,6 +325,25 @@ fn a_frame_that_fails_does_not_stop_the_others() {
 }
 
 #[test]
+fn the_pose_of_a_frame_is_read_for_that_frame_alone() {
+    let folder = stage();
+    let object = |x: f32| format!("v {x} 0 0\nv {} 0 0\nv {x} 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n", x + 1.0);
+    for (file, x) in [("base.obj", 0.0), ("p2.obj", 1.0), ("p3.obj", 2.0)] {
+        fs::write(folder.path().join(file), object(x)).unwrap();
+    }
+    let scene = "[environment]\nradiance = 1\n[[mesh]]\nname = \"m\"\nfile = \"base.obj\"\n\
+        [[animation]]\nmesh = \"m\"\nfile = \"p#.obj\"\nfirst = 1\nlast = 3\nfps = 24\n";
+    fs::write(folder.path().join("s.toml"), scene).unwrap();
+    let output = run(&folder, "--frames 0..3 -o f.#.exr");
+    complains(&output, 6, &["frame 0: ", "p1.obj: cannot be read"]);
+    assert!(["f.1.exr", "f.2.exr"].iter().all(|file| folder.path().join(file).is_file()));
+    well(&folder, "--frames 0..3 --only 1..3 -o g.#.exr");
+    assert!(
+        bits(&folder, "g.2.exr") == bits(&folder, "f.2.exr") && bits(&folder, "g.2.exr") != bits(&folder, "g.1.exr")
+    );
+}
+
+#[test]
 fn options_that_cannot_be_are_one_line() {
     let folder = stage();
     for (words, part) in [

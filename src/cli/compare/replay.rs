@@ -1,7 +1,8 @@
 //! Command lines that render a pixel of a file again.
 use super::report;
+use crate::cli::choices::Choices;
 use crate::cli::quoted;
-use crate::cli::render::{CHOICES, FRAME};
+use crate::cli::render::FRAME;
 use crate::image::Film;
 use crate::render::provenance::{Provenance, SampleRange};
 use crate::render::settings::Settings;
@@ -18,9 +19,7 @@ pub fn commands(film: &Film, [x, y]: [u32; 2], stem: &str) -> Result<Vec<String>
             "it is a frame of a sequence, which tallow sequence --only {frame} renders again as a whole"
         ));
     }
-    let chosen =
-        |key: &str| film.metadata.get(key).map(|name| format!("--{key} {} ", quoted(name))).unwrap_or_default();
-    let view = CHOICES.map(chosen).concat();
+    let view = Choices::of(&film.metadata).words();
     let Provenance { settings, samples: ranges, .. } = Provenance::of(film)?;
     let taken =
         film.channel(report::SAMPLES).map(|counts| counts.at(y as usize * film.width as usize + x as usize) as u32);
@@ -35,7 +34,7 @@ pub fn commands(film: &Film, [x, y]: [u32; 2], stem: &str) -> Result<Vec<String>
         let spp = taken.filter(|_| alone).unwrap_or(range.count);
         let SampleRange { seed, first, .. } = range;
         format!(
-            "tallow render {} {view}{}--seed {seed} --first-sample {first} --spp {spp} --pixel {x},{y} -o {stem}-{x}-{y}{part}.exr",
+            "tallow render {}{view} {}--seed {seed} --first-sample {first} --spp {spp} --pixel {x},{y} -o {stem}-{x}-{y}{part}.exr",
             quoted(scene),
             options(&settings),
         )

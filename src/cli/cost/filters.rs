@@ -39,13 +39,13 @@ fn candidates(args: &Args, image: &Path) -> Result<Vec<FilterCandidate>> {
     let plain: Vec<_> = args.denoise.iter().map(|filter| of(filter, "")).collect::<Result<_>>()?;
     let mut varied = Vec::new();
     for variant in &args.variants {
-        let before = varied.len();
-        for (filter, plain) in args.denoise.iter().zip(&plain).filter(|(filter, _)| !filter.is_none()) {
+        let (before, given) = (varied.len(), overrides(variant)?.given.given());
+        let reads = |filter: &Method| !filter.is_none() && given.iter().any(|option| filter.reads(option));
+        for (filter, plain) in args.denoise.iter().zip(&plain).filter(|(filter, _)| reads(filter)) {
             let candidate = of(filter, variant)?;
             varied.extend((candidate.settings != plain.settings).then_some(candidate));
         }
         if varied.len() == before {
-            overrides(variant)?;
             return Err(Error::Usage(format!("\"{}\" changes no filter of the list", variant.trim())));
         }
     }

@@ -1,7 +1,6 @@
 //! The knobs that `tallow cost --ablate` turns, one at a time.
 use crate::allocate::Placing;
 use crate::cost::grid::Candidate;
-use crate::denoise::filter::readers;
 use crate::settings::entry::Entry;
 
 /// A knob, and the values that are tried of it: what a user would write behind `--`.
@@ -16,18 +15,16 @@ struct Knob {
 enum Reader {
     /// All.
     Paths,
-    /// What is filtered, because the filter gets another part of the light.
-    Filtered,
-    /// What is placed.
+    /// What is filtered, because the filter gets another part of the light, and what is placed by a policy that weighs the parts.
+    Split,
+    /// What is placed by a policy that reads the setting of this name.
     Placed,
-    /// What is placed by one of these policies.
-    Policies(&'static [&'static str]),
     /// What is filtered by one of the filters that read the setting of this name.
     Filters,
     /// What begins with samples of earlier frames.
     Carried,
 }
-use Reader::{Carried, Filtered, Filters, Paths, Placed, Policies};
+use Reader::{Carried, Filters, Paths, Placed, Split};
 
 const fn knob(name: &'static str, values: &'static [&'static str], read_by: Reader) -> Knob {
     Knob { name, values, read_by }
@@ -38,14 +35,14 @@ const KNOBS: &[Knob] = &[
     knob("max-depth", &["2", "3", "4", "5", "6", "7", "8"], Paths),
     knob("roulette-depth", &["0", "3", "5"], Paths),
     knob("sampler", &["sobol", "independent"], Paths),
-    knob("split", &["soft", "indirect"], Filtered),
+    knob("split", &["soft", "indirect"], Split),
     knob("min-spp", &["0", "1", "2", "4"], Placed),
     knob("max-spp", &["0", "8", "16", "32", "64"], Placed),
-    knob("window", &["2", "4", "8"], Policies(&["geometry", "both"])),
-    knob("sigma-normal", &["0.1", "0.35", "1"], Policies(&["geometry", "both"])),
-    knob("sigma-position", &["0.01", "0.03", "0.1"], Policies(&["geometry", "both"])),
-    knob("luminance-floor", &["0.01", "0.05", "0.2"], Policies(&["variance", "both"])),
-    knob("filtered", &["0", "0.5", "0.9"], Policies(&["both"])),
+    knob("window", &["2", "4", "8"], Placed),
+    knob("sigma-normal", &["0.1", "0.35", "1"], Placed),
+    knob("sigma-position", &["0.01", "0.03", "0.1"], Placed),
+    knob("luminance-floor", &["0.01", "0.05", "0.2"], Placed),
+    knob("filtered", &["0", "0.5", "0.9"], Placed),
     knob("levels", &["2", "3", "4", "5", "6"], Filters),
     knob("radius", &["6", "12", "24", "48"], Filters),
     knob("sigma-rt", &["0.3", "1", "3", "inf"], Filters),
@@ -71,9 +68,13 @@ pub fn steps(candidate: &Candidate) -> Vec<String> {
     KNOBS.iter().filter(|knob| knob.is_read_by(candidate)).flat_map(|knob| knob.steps(candidate)).collect()
 }
 
-/// Whether a point reads a setting that another one changes. What no knob names is read by all.
+/// Whether a point reads a setting that another one changes. What no knob names is read by all. A noise threshold gives a policy that
+/// learns to those that do not: points of that other policy.
 pub fn reads_change(point: &Candidate, other: &Candidate) -> bool {
     let changed = |(own, others): (Entry, Entry)| (own.value != others.value).then_some(own.name);
+    if point.settings.allocate.policy != other.settings.allocate.policy {
+        return false;
+    }
     let mut changed = entries(point).into_iter().zip(entries(other)).filter_map(changed);
     changed.any(|name| KNOBS.iter().filter(|knob| knob.name == name).all(|knob| knob.is_read_by(point)))
 }
@@ -88,7 +89,8 @@ impl Knob {
         let own = entries(candidate).into_iter().find(|entry| entry.name == self.name).map(|entry| entry.value);
         let allowed = |value: &str| {
             // Fewer at most than there are on average would leave samples over.
-            self.name != "max-spp" || value.parse().is_ok_and(|most: u32| most == 0 || most > candidate.settings.spp)
+            let limits = self.name == "max-spp" && candidate.settings.allocate.policy.placing != Placing::Chosen;
+            !limits || value.parse().is_ok_and(|most: u32| most == 0 || most > candidate.settings.spp)
         };
         let others = self.values.iter().filter(|&&value| own.as_deref() != Some(value) && allowed(value));
         let switch = self.values.is_empty().then(|| format!("--{}", self.name));
@@ -96,13 +98,11 @@ impl Knob {
     }
 
     fn is_read_by(&self, candidate: &Candidate) -> bool {
-        let policy = candidate.settings.allocate.policy;
         match self.read_by {
             Paths => true,
-            Filtered => candidate.filter.is_some(),
-            Placed => policy.placing != Placing::Even,
-            Policies(names) => names.contains(&policy.name),
-            Filters => candidate.filter.is_some_and(|filter| readers(self.name).contains(&filter.name())),
+            Split => candidate.filter.is_some() || candidate.settings.allocate.policy.split_light,
+            Placed => candidate.settings.allocate.policy.reads(self.name),
+            Filters => candidate.filter.is_some_and(|filter| filter.reads(self.name)),
             Carried => candidate.carries.is_some(),
         }
     }
@@ -150,6 +150,14 @@ mod tests {
                 }
             }
         }
+        let unfiltered = |policy| Candidate { filter: None, ..candidate(policy, Method::all().next().unwrap(), 16) };
+        let has = |policy, step: &str| steps(&unfiltered(policy)).contains(&step.to_owned());
+        assert_eq!(["both", "geometry"].map(|policy| has(policy, "--split indirect")), [true, false]);
+        assert_eq!(
+            ["both", "threshold"].map(|policy| has(policy, "--max-spp 8")),
+            [false, true],
+            "no limit of samples there"
+        );
         let of_16 = steps(&candidate("both", Method::all().next().unwrap(), 16));
         assert!(of_16.contains(&"--max-spp 32".to_owned()) && !of_16.contains(&"--max-spp 16".to_owned()));
     }
@@ -163,6 +171,8 @@ mod tests {
         };
         assert!(!reads("uniform", "--min-spp 1 --luminance-floor 0.2") && !reads("uniform", "--radius 9"));
         assert!(reads("geometry", "--min-spp 1 --luminance-floor 0.2") && reads("uniform", "--min-spp 1 --levels 3"));
+        assert!(reads("threshold", "--luminance-floor 0.2") && !reads("geometry", "--luminance-floor 0.2"));
+        assert!(!reads("uniform", "--noise-threshold 0.1") && reads("both", "--noise-threshold 0.1"));
         assert!(reads("uniform", "--indirect-stride 2"), "no knob, so that all may read it");
     }
 

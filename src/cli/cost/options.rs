@@ -1,5 +1,6 @@
 //! Options of `tallow cost`.
 use crate::allocate::{AllocateOverrides as Allocate, Policy};
+use crate::cli::choices::Choices;
 use crate::cli::common::{Common, frames_per_second, with_ranges};
 use crate::cli::filter::options as filter;
 use crate::cli::overrides::Overrides;
@@ -23,6 +24,7 @@ use std::path::PathBuf;
 /// Of a scene that moves the image of one frame is judged (--frame), alone and as the end of a sequence whose frames begin with
 /// samples of the last (--reproject): time and samples are that frame's.
 #[derive(clap::Args)]
+#[command(mut_args(as_of_scene))]
 pub struct Args {
     /// Scene file (.toml, .gltf, .glb) or model (.obj, .ply)
     #[arg(required_unless_present = "filter_only")]
@@ -109,12 +111,20 @@ pub struct Args {
     /// Who finds what rays meet
     #[arg(long, value_enum, default_value_t, conflicts_with = "filter_only")]
     pub tracing: Tracing,
+    /// What of a glTF file is seen.
+    #[command(flatten)]
+    pub choices: Choices,
     /// The device, and what is printed.
     #[command(flatten)]
     pub common: Common,
     /// Size of the film.
     #[command(flatten)]
     pub film: FilmOptions,
+}
+
+/// An image that is given leaves nothing to choose of a scene.
+fn as_of_scene(arg: Arg) -> Arg {
+    if ["camera", "clip"].contains(&arg.get_id().as_str()) { arg.conflicts_with("filter_only") } else { arg }
 }
 
 /// Settings of the film, with their ranges in the help.

@@ -85,6 +85,29 @@ impl Folder {
         self.files.borrow_mut().save(&[item], false);
     }
 
+    /// Renames the files of another measurement that is not complete, which a complete one would replace, so that it can go on.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub fn set_aside_other(&self, key: &str) -> Result<()> {
+        let json = self.path.join(NAMES[0]);
+        let is_other = |(file, document): &(PathBuf, Document)| *file == json && document.measurement.key != key;
+        if !self.begun.iter().any(is_other) {
+            return Ok(());
+        }
+        let partial = partial_name(&json);
+        let stem = partial.file_stem().unwrap_or_default().to_string_lossy();
+        let numbered = (2..).map(|number| partial.with_file_name(format!("{stem}-{number}.json")));
+        let free = std::iter::once(partial.clone()).chain(numbered).find(|file| !file.exists());
+        let free = free.expect("a folder has fewer files than there are numbers");
+        for from in NAMES.map(|name| self.path.join(name)).into_iter().filter(|from| from.exists()) {
+            let to = free.with_extension(from.extension().unwrap_or_default());
+            std::fs::rename(&from, &to)
+                .map_err(|e| Error::output(&from, format!("cannot be renamed to {}: {e}", to.display())))?;
+        }
+        Ok(())
+    }
+
     /// Writes the results and returns their paths. What is not whole replaces no earlier result.
     pub fn write(&self, document: &Document, images: &Images, whole: bool) -> Vec<PathBuf> {
         let mut files = self.files.borrow_mut();
@@ -370,6 +393,28 @@ mod tests {
         assert!(open().check_subject("a").is_ok());
         let why = open().check_subject("b").unwrap_err().to_string();
         assert!(why.contains("holds what was measured of \"a\", which \"b\" would replace"), "{why}");
+    }
+
+    #[test]
+    fn what_is_not_complete_survives_a_complete_one_of_another_key() {
+        let pictures =
+            Images { reference: Picture { width: 1, height: 1, pixels: vec![[0.0; 3]] }, points: Vec::new() };
+        let folder = tempfile::tempdir().unwrap();
+        let open = || Folder::open(folder.path(), &[]).unwrap();
+        let complete = |key: &str| {
+            let of_key = open();
+            let goes_on = of_key.earlier(key).is_some();
+            of_key.set_aside_other(key).unwrap();
+            of_key.write(&Document { complete: true, ..document(key) }, &pictures, true);
+            goes_on
+        };
+        for key in ["begun", "begun too"] {
+            open().write(&document(key), &pictures, false);
+        }
+        assert!(!complete("short") && open().earlier("begun").is_some() && open().earlier("begun too").is_some());
+        assert!(!complete("short") && complete("begun") && complete("begun too"));
+        let left = std::fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(left, 3, "what went on to its end takes its files along");
     }
 
     /// One that was killed before it had a table and a page takes none of another.

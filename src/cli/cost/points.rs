@@ -1,7 +1,6 @@
 //! The points that `tallow cost` measures: the scene, how it moves, the settings of each point, and the command that renders it.
 use super::options::Words;
 use super::{Args, knobs};
-use crate::cli::quoted;
 use crate::cost::grid::{self, Candidate};
 use crate::cost::{JudgedFrame, Motion};
 use crate::denoise::filter::{FilterSettings, Method};
@@ -10,7 +9,7 @@ use crate::gpu::Gpu;
 use crate::render::settings::Settings;
 use crate::render::{Reproject, Reprojection, can_carry};
 use crate::scene::animation::Animation;
-use crate::scene::{Loaded, Scene, SceneFile};
+use crate::scene::{Loaded, Scene};
 use crate::settings::entry::{self, Value};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -33,7 +32,7 @@ impl Points {
     /// # Errors
     /// Of scene and options.
     pub fn new(args: &Args, path: &Path, gpu: &Gpu) -> Result<(Scene, Self)> {
-        let mut file = SceneFile::open(path)?;
+        let mut file = args.choices.open(path)?;
         file.stays_still();
         let (mut base, mut filters, mut carries) = (file.settings()?, FilterSettings::default(), Reproject::default());
         args.film.apply(&mut base);
@@ -49,6 +48,7 @@ impl Points {
         let axes = args.axes(reproject(args, able)?.into_iter().map(of).collect());
         let mut candidates = grid::grid(&base, &filters, &axes);
         candidates.iter().try_for_each(|candidate| candidate.settings.validate())?;
+        candidates.iter().try_for_each(|candidate| candidate.settings.check_most())?;
         candidates.iter().try_for_each(Candidate::check_stride)?;
         let mut notes = Vec::new();
         candidates.extend(varied(args, &candidates, &mut notes)?);
@@ -101,7 +101,8 @@ fn varied(args: &Args, grid: &[Candidate], notes: &mut Vec<String>) -> Result<Ve
     }
     for point in grid.iter().filter(|_| args.ablate) {
         for step in knobs::steps(point) {
-            all.extend(with(point, &step, &Words::parse(&step)?));
+            let varied = with(point, &step, &Words::parse(&step)?);
+            all.extend(varied.filter(|varied| varied.settings.validate().is_ok()));
         }
     }
     Ok(all)
@@ -120,10 +121,10 @@ fn possible(variants: Vec<Candidate>, notes: &mut Vec<String>) -> Result<Vec<Can
     Ok(able)
 }
 
-/// The command that renders a point's first image. Unfiltered points go to .hdr: for an .exr more layers are kept, which takes
+/// The command that renders a point's first image of `scene`, which are words for a shell. Unfiltered points go to .hdr: for an .exr more layers are kept, which takes
 /// longer than what was measured. Filters with settings of their own run behind the render, to the same bits.
 pub fn command(
-    scene: &Path,
+    scene: &str,
     judged: Option<JudgedFrame>,
     from: &Settings,
     candidate: &Candidate,
@@ -132,7 +133,6 @@ pub fn command(
     let words = |words: Vec<String>| words.into_iter().map(|word| format!(" {word}")).collect::<String>();
     let tracing = if ray_queries { " --tracing ray-query" } else { "" };
     let settings = words(grid::options(&from.entries(), &candidate.settings.entries())) + tracing;
-    let scene = quoted(&scene.display().to_string());
     let (render, number) = match judged {
         None => (format!("tallow render {scene}{settings}"), String::new()),
         Some(judged) => {

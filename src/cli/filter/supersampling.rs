@@ -1,5 +1,6 @@
 //! `filter --scene`: the filtered light is looked up along several eye rays per pixel.
-use crate::cli::render::{CHOICES, FRAME};
+use crate::cli::choices::Choices;
+use crate::cli::render::FRAME;
 use crate::denoise::Filtered;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
@@ -8,7 +9,7 @@ use crate::layout::vec3;
 use crate::render::provenance::Provenance;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Outputs, Renderer};
-use crate::scene::{Loaded, SceneFile};
+use crate::scene::Loaded;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -40,19 +41,14 @@ impl Supersampling {
     ) -> Result<Option<(Vec<vec3>, Vec<PassTime>)>> {
         let Some(path) = &self.scene else { return Ok(None) };
         let of_image = |what| Error::input(image, what);
-        let said = |key: &str| aovs.film.metadata.get(key).map(String::as_str);
-        if let Some(frame) = said(FRAME) {
+        if let Some(frame) = aovs.film.metadata.get(FRAME) {
             let what = format!("is frame {frame} of a sequence: --scene knows a scene only as tallow render shows it");
             return Err(of_image(what));
         }
         let provenance = Provenance::of(aovs.film).map_err(of_image)?;
         let settings = settings(aovs, &provenance).map_err(of_image)?;
         settings.validate()?;
-        let [camera, clip] = CHOICES.map(said);
-        let mut file = SceneFile::open_clip(path, clip)?;
-        if let Some(name) = camera {
-            file.look_through(name)?;
-        }
+        let mut file = Choices::of(&aovs.film.metadata).open(path)?;
         file.stays_still(); // as the render did
         let Loaded { scene, .. } = file.load()?;
         provenance.shows(&scene, &settings).map_err(of_image)?;

@@ -8,7 +8,7 @@ use crate::gpu::PassTime;
 use crate::profile::{Measured, Profile, Subject, measure};
 use crate::render::settings::Settings;
 use crate::report::trace::chrome_trace;
-use crate::scene::{Scene, SceneFile};
+use crate::scene::Scene;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
 /// Frames that are timed unless a number is given.
@@ -30,7 +30,7 @@ pub struct Fresh {
 /// As a render of the scene; [`Error::Usage`] for an old profile of something else.
 pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     args.denoise.map(row).transpose()?;
-    let mut file = SceneFile::open(&args.scene)?;
+    let mut file = args.choices.open(&args.scene)?;
     file.stays_still();
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);

@@ -69,8 +69,6 @@ impl Shot<'_> {
     }
 }
 
-/// Options that choose what of a glTF file is seen, by which an image's metadata name them too.
-pub const CHOICES: [&str; 2] = ["camera", "clip"];
 /// Of an image's metadata: which frame of a sequence it is.
 pub const FRAME: &str = "frame";
 
@@ -85,7 +83,6 @@ fn metadata(args: &Args, gpu: &Gpu, seconds: f64) -> BTreeMap<String, String> {
         ("renderSeconds", format!("{seconds:.3}")),
         ("dateUnix", since_epoch.as_secs().to_string()),
     ];
-    let named = CHOICES.into_iter().zip([&args.camera, &args.clip]);
-    let chosen = named.filter_map(|(key, name)| Some((key, name.clone()?)));
+    let chosen = args.choices.given().map(|(key, name)| (key, name.to_owned()));
     entries.into_iter().chain(chosen).map(|(k, v)| (k.to_owned(), v)).collect()
 }

@@ -80,7 +80,8 @@ impl<'a> Stage<'a> {
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         let rest = survey.effects(&settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
-        let moves = Moves::of(&animation)?;
+        let moves = Moves::of(&animation);
+        render::warn_of_unread(&args.render, &settings);
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
         Ok(Self {
             args,

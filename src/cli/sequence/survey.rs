@@ -66,12 +66,13 @@ impl Survey<'_> {
         found
     }
 
-    /// Some of the poses, of those movers whose first one is `wanted`. What cannot be posed is left out: its frame says so.
+    /// Some of the poses, of those movers whose first one is `wanted`, or cannot be told. What cannot be posed is left out: its frame
+    /// says so.
     fn poses(&self, most: u32, wanted: impl Fn(&Pose) -> bool) -> impl Iterator<Item = Pose> {
         let mut movers = self.animation.movers.clone();
         movers.retain(|mover| {
             let mut pose = Pose::default();
-            mover.pose(self.seconds(self.frames.start), &mut pose).is_ok() && wanted(&pose)
+            mover.pose(self.seconds(self.frames.start), &mut pose).is_err() || wanted(&pose)
         });
         let most = if movers.is_empty() { 0 } else { most };
         let animation = Animation { movers };

@@ -1,5 +1,5 @@
 //! What a user can choose to filter an image by.
-use super::{FILTERS, Row, none, oidn};
+use super::{FILTERS, Row, none, oidn, readers};
 use crate::error::{Error, Result};
 use crate::gpu::Oidn;
 
@@ -39,6 +39,12 @@ impl Method {
     /// Whether it filters an image but keeps away from it what the lens blurs of sharp light.
     pub fn leaves_noise_of_lens(self) -> bool {
         matches!(self, Self::Kernels(row) if !row.weighs_noise) && !self.is_none()
+    }
+
+    /// Whether it reads the setting of this option. What no filter in particular reads is read by all.
+    pub fn reads(self, option: &str) -> bool {
+        let filters = readers(option);
+        filters.is_empty() || filters.contains(&self.name())
     }
 
     /// One line of help.

@@ -72,12 +72,11 @@ pub enum Moves {
 }
 
 impl Moves {
-    /// What an animation moves: every pose says of all that ever moves where it is.
-    ///
-    /// # Errors
-    /// Those of [`Animation::at`].
-    pub fn of(animation: &Animation) -> Result<Self> {
-        Ok(if animation.at(0.0)?.is_of_camera_alone() { Self::Camera } else { Self::Scene })
+    /// What an animation moves: every pose says of all that ever moves where it is. One that lacks the pose of its beginning, such as a
+    /// file, may move all.
+    pub fn of(animation: &Animation) -> Self {
+        let is_of_camera = animation.at(0.0).is_ok_and(|pose| pose.is_of_camera_alone());
+        if is_of_camera { Self::Camera } else { Self::Scene }
     }
 }
 
