@@ -9,9 +9,9 @@ use crate::scene::build::environment::{self, rotation};
 use crate::scene::build::hierarchy::{check_none_lost, instance, is_speck, reach};
 use crate::scene::build::plan::is_even;
 use crate::scene::build::soft::Placed;
-use crate::scene::description::Transform;
+use crate::scene::description::{LightTable, Transform};
 use crate::scene::load::material::{radiance, reflectance};
-use crate::scene::pose::{EnvironmentChange, Pose, Vertices};
+use crate::scene::pose::{EnvironmentChange, MaterialChange, Pose, Vertices};
 use crate::scene::{Fingerprint, Scene};
 use glam::{DAffine3, DMat3, Vec3};
 use std::collections::HashSet;
@@ -220,8 +220,14 @@ fn material_name(scene: &Scene, index: usize) -> String {
 /// # Errors
 /// A sentence with what cannot be.
 pub fn check_numbers(scene: &Scene, pose: &Pose) -> Checked<Vec<String>> {
-    next_materials(scene, pose)?;
-    next_lights(scene, pose)?;
+    for (index, to) in &pose.materials {
+        next_material(scene, &scene.materials, *index, to)?;
+    }
+    let lights = placed_lights(scene);
+    for (index, table) in &pose.lights {
+        next_light(lights, *index, table)?;
+    }
+    next_of_sky(scene, pose)?;
     if let Some(camera) = &pose.camera {
         camera.build([1, 1], scene.bounds).map_err(|what| format!("camera: {what}"))?;
     }
@@ -243,30 +249,48 @@ fn next_materials(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Material>>> 
     }
     let mut materials = scene.materials.clone();
     for (index, to) in &pose.materials {
-        let count = materials.len();
-        let m = materials.get_mut(*index).ok_or_else(|| format!("material {index} of {count}: there is none"))?;
-        *m = changed(m, to).map_err(|what| format!("{}: {what}", material_name(scene, *index)))?;
+        materials[*index] = next_material(scene, &materials, *index, to)?;
     }
     Ok((materials != scene.materials).then_some(materials))
+}
+
+fn next_material(scene: &Scene, materials: &[Material], index: usize, to: &MaterialChange) -> Checked<Material> {
+    let count = materials.len();
+    let m = materials.get(index).ok_or_else(|| format!("material {index} of {count}: there is none"))?;
+    changed(m, to).map_err(|what| format!("{}: {what}", material_name(scene, index)))
 }
 
 fn next_lights(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Light>>> {
     if pose.lights.is_empty() && pose.environment.is_none() {
         return Ok(None);
     }
-    let mut lights = scene.rig.lights.clone();
-    let sky = lights.iter().position(|light| light.kind == LIGHT_ENVIRONMENT);
-    let count = sky.unwrap_or(lights.len());
+    let (mut lights, count) = (scene.rig.lights.clone(), placed_lights(scene));
     for (index, table) in &pose.lights {
-        let light = lights[..count].get_mut(*index);
-        let light = light.ok_or_else(|| format!("light {index} of {count}: there is none"))?;
-        *light = table.build().map_err(|what| format!("light {index}: {what}"))?;
+        lights[*index] = next_light(count, *index, table)?;
     }
-    if let Some(to) = &pose.environment {
-        let sky = sky.ok_or("the scene has no environment that could change")?;
-        lights[sky] = next_sky(&lights[sky], to)?;
+    if let Some(sky) = next_of_sky(scene, pose)? {
+        lights[count] = sky;
     }
     Ok((lights != scene.rig.lights).then_some(lights))
+}
+
+/// How many lights have a table, behind which the sky is one more.
+fn placed_lights(scene: &Scene) -> usize {
+    let lights = &scene.rig.lights;
+    lights.iter().rposition(|light| light.kind == LIGHT_ENVIRONMENT).unwrap_or(lights.len())
+}
+
+fn next_light(count: usize, index: usize, table: &LightTable) -> Checked<Light> {
+    if index >= count {
+        return Err(format!("light {index} of {count}: there is none"));
+    }
+    table.build().map_err(|what| format!("light {index}: {what}"))
+}
+
+fn next_of_sky(scene: &Scene, pose: &Pose) -> Checked<Option<Light>> {
+    let Some(to) = &pose.environment else { return Ok(None) };
+    let sky = scene.rig.lights.get(placed_lights(scene)).ok_or("the scene has no environment that could change")?;
+    next_sky(sky, to).map(Some)
 }
 
 fn next_sky(sky: &Light, to: &EnvironmentChange) -> Checked<Light> {
