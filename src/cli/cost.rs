@@ -8,7 +8,7 @@ mod points;
 use super::files::scene_name;
 use super::{Exit, complain, fail_on_messages, interrupt, quoted};
 use crate::cost::document::SceneInfo;
-use crate::cost::{Document, Ended, Images, JudgedFrame, Plan, Watch, key, measure, others, reference};
+use crate::cost::{Document, Ended, Images, JudgedFrame, Plan, Watch, key, measure, others, reference, seeds_of};
 use crate::error::{Error, Result};
 use crate::gpu::{self, Gpu};
 use crate::scene::Scene;
@@ -41,7 +41,8 @@ pub fn run(args: &Args) -> Result<Exit> {
 fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> Result<Plan> {
     let Points { motion, base, candidates, .. } = points;
     let [width, height] = [base.width, base.height];
-    let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base)));
+    let seeds = seeds_of(base.seed, args.repeats, motion.is_some());
+    let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base, &seeds)));
     let reference = args.reference.as_deref().map(given).transpose()?;
     let settings = args.choices.open(path)?.settings()?;
     let judged = motion.as_ref().map(|motion| motion.judged);

@@ -85,23 +85,26 @@ impl Converging {
     }
 
     /// The reference of `spp` samples per pixel that an earlier measurement had, to the same bits: errors against a better one are no
-    /// errors of the same kind. What was kept with more is left alone and made anew with fewer. Only a user who stops it leaves it
-    /// incomplete.
+    /// errors of the same kind. What was kept with more is left alone and made anew with fewer. Only a user who stops it leaves its
+    /// picture incomplete; what is told of it stays that by which the earlier runs were judged.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn again(&mut self, spp: u32, notes: &[String], watch: &Watch) -> Result<Reference> {
+    pub fn again(&mut self, spp: u32, earlier: &ReferenceInfo, watch: &Watch) -> Result<Reference> {
         let parts = spp / PART_SPP;
         if self.parts.count > parts {
             (self.parts, self.file) = (Parts::new(self.parts.size), None);
         }
         let was = self.parts.count;
-        self.grow_to(parts, None, watch)?;
+        let is_whole = self.grow_to(parts, None, watch)?;
         if self.parts.count > was {
             self.keep();
         }
         let mut reference = self.reference();
-        reference.info.notes = notes.to_vec();
+        match is_whole {
+            true => reference.info.notes.clone_from(&earlier.notes),
+            false => reference.info = earlier.clone(),
+        }
         Ok(reference)
     }
 

@@ -55,7 +55,7 @@ pub fn measure(
         None => {
             let mut growing = Converging::new(gpu, scene, &plan.base, plan.cache.as_deref())?;
             match judged_by {
-                Some(ReferenceInfo { spp: Some(spp), notes, .. }) => growing.again(spp, &notes, watch)?,
+                Some(earlier @ ReferenceInfo { spp: Some(spp), .. }) => growing.again(spp, &earlier, watch)?,
                 _ => {
                     let limit = plan.budget.map(|budget| begun + budget / REFERENCE_SHARE);
                     let pilots = pilots(&mut measuring, &shots);

@@ -37,7 +37,7 @@ pub use assemble::Ended;
 pub use document::Document;
 pub use measure::measure;
 pub use motion::{JudgedFrame, Motion};
-pub use plan::{Plan, Watch, key};
+pub use plan::{Plan, Watch, key, seeds_of};
 
 use crate::image::Picture;
 

@@ -98,8 +98,13 @@ pub fn values(settings: &[Entry]) -> Vec<String> {
 
 /// Seeds of the runs. Where a run renders several frames it needs several.
 pub fn seeds(plan: &Plan) -> Vec<u32> {
-    let each = if plan.motion.is_some() { JudgedFrame::SEEDS } else { 1 };
-    (0..plan.repeats).map(|i| plan.base.seed.wrapping_add(i * each)).collect()
+    seeds_of(plan.base.seed, plan.repeats, plan.motion.is_some())
+}
+
+/// Seeds of so many runs of a scene that begin with this one.
+pub fn seeds_of(first: u32, repeats: u32, moves: bool) -> Vec<u32> {
+    let each = if moves { JudgedFrame::SEEDS } else { 1 };
+    (0..repeats).map(|i| first.wrapping_add(i * each)).collect()
 }
 
 /// There must be points, and their pictures, the reference and what judging takes must fit into memory.

@@ -22,11 +22,11 @@ pub struct Reference {
 }
 
 /// Reads a reference of the user's and checks that it can be one for a film of `size`. With a scene, a file that Tallow rendered
-/// must show it.
+/// must show it; it is told of one of the `seeds` of runs that it has too.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Memory`].
-pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings)>) -> Result<Reference> {
+pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings, &[u32])>) -> Result<Reference> {
     let film = image::read(path)?;
     let wrong = |what: String| Error::input(path, what);
     if [film.width, film.height] != size {
@@ -39,9 +39,13 @@ pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings)>) -> 
     let picture = film.rec709(None).and_then(Picture::finite).map_err(wrong)?;
     let provenance = Provenance::of(&film).ok();
     let mut notes = Vec::new();
-    if let (Some(provenance), Some((scene, settings))) = (&provenance, shows) {
+    if let (Some(provenance), Some((scene, settings, seeds))) = (&provenance, shows) {
         provenance.shows(scene, settings).map_err(|what| wrong(format!("{what}: it is no reference for that")))?;
         notes.extend(differences(&provenance.settings, settings));
+        let shared = provenance.samples.iter().map(|range| range.seed).find(|seed| seeds.contains(seed));
+        notes.extend(shared.map(|seed| {
+            format!("the reference has samples of seed {seed}, as a run has: errors of that run are too small; render it with another --seed")
+        }));
     }
     let filter = film.metadata.get(FILTERED);
     notes.extend(filter.map(|filter| {

@@ -233,6 +233,22 @@ fn a_reference_that_was_replaced_begins_another_measurement() {
 }
 
 #[test]
+fn a_reference_of_samples_that_are_judged_is_told_of() {
+    let folder = tempfile::tempdir().unwrap();
+    for seed in [1, 7] {
+        let words = format!("render {} --width 24 --height 24 --quiet --spp 4 --seed {seed} -o {seed}.exr", scene());
+        assert!(within(&folder, &words).status().unwrap().success());
+    }
+    let notes = |seed: u32| {
+        let grid = "--allocate uniform --denoise none --spp 1 --repeats 2 --quiet";
+        text(&cost(&folder, &format!("{grid} --reference {seed}.exr -o of{seed}")), 0);
+        document(&folder, &format!("of{seed}/cost.json")).reference.notes
+    };
+    assert!(notes(1).iter().any(|note| note.contains("has samples of seed 1, as a run has")), "{:?}", notes(1));
+    assert!(!notes(7).iter().any(|note| note.contains("seed")), "{:?}", notes(7));
+}
+
+#[test]
 fn an_interrupted_measurement_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let words = |repeats| {

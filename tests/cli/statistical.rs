@@ -55,6 +55,22 @@ fn each_verdict_has_its_exit_code() {
     assert!(stdout(&tallow(&folder, &["--help"])).contains("\n  7    too noisy to say: compare --statistical"));
 }
 
+#[test]
+fn beside_black_nothing_is_relative() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, one) in [("a.exr", 1.0), ("b.exr", 0.0)] {
+        let mut film = Film::new(16, 16);
+        let of_one = |value: f32| (0..256).map(|i| if i == 40 { [value; 3] } else { [0.0; 3] }).collect::<Vec<_>>();
+        film.add_vec3("", ["R", "G", "B"], &of_one(one));
+        film.add_vec3("m2", ["R", "G", "B"], &of_one(one * 16.0 * 15.0));
+        film.add("samples", Samples::U32(vec![16; 256]));
+        film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+        image::write(&folder.path().join(name), &film, &WriteOptions::default()).unwrap();
+    }
+    let output = compare(&folder, "a.exr b.exr");
+    complains(&output, 7, &["too noisy to say", "in the whole image B is black"]);
+}
+
 /// Of a filtered image its samples are tested, which is said wherever the verdict is.
 #[test]
 fn filtered_images_are_told_apart() {

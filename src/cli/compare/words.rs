@@ -49,6 +49,9 @@ pub fn verdict(report: &Report) -> String {
             )
         }
         Verdict::Different => format!("different: {}", different(&report.outcome)),
+        Verdict::TooNoisy { samples, .. } if !samples.is_finite() => {
+            format!("too noisy to say: no difference is found, but in {place} B is black, to which nothing is relative")
+        }
         Verdict::TooNoisy { visible, samples } => format!(
             "too noisy to say: no difference is found, but one of {place}, if in one channel alone, is seen only from {} on; {} takes \
              about {} times the samples{}",
