@@ -6,7 +6,7 @@ use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::process::{Command, Output};
 use tallow::render::{Outputs, Renderer, frame_constants};
-use tallow::scene::{Loaded, Scene};
+use tallow::scene::{Loaded, Scene, SceneFile};
 use tallow::twins::primary_hit::guide;
 use tempfile::TempDir;
 
@@ -90,7 +90,11 @@ fn what_is_repaired_in_a_mesh_is_told_once_for_all_instances() {
     let instances: String =
         (0..3).map(|x| format!("[[instance]]\nmesh = \"m\"\ntransform = {{ translate = [{x}, 0, 0] }}\n")).collect();
     let text = format!("[environment]\n[[mesh]]\nname = \"m\"\nfile = \"a.obj\"\n{instances}");
-    let scene = Scene::parse(&folder.path().join("s.toml"), &text).unwrap().scene;
+    let path = folder.path().join("s.toml");
+    std::fs::write(&path, text).unwrap();
+    let mut file = SceneFile::open(&path).unwrap();
+    file.stays_still(); // so that each instance is stored
+    let scene = file.load().unwrap().scene;
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
     assert!(scene.warnings[0].contains("1 without vertex normals"), "{:?}", scene.warnings);
 }
