@@ -1,6 +1,8 @@
 //! Options that choose what of a glTF file is seen.
+use super::overrides::Overrides;
 use super::quoted;
 use crate::error::Result;
+use crate::render::settings::Settings;
 use crate::scene::SceneFile;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,6 +29,18 @@ impl Choices {
             file.look_through(name)?;
         }
         Ok(file)
+    }
+
+    /// The same at rest, with its settings, those of `overrides` in place of its own, which nobody has checked yet.
+    ///
+    /// # Errors
+    /// As [`Choices::open`] and [`SceneFile::settings`].
+    pub fn open_at_rest(&self, path: &Path, overrides: &Overrides) -> Result<(SceneFile<'static>, Settings)> {
+        let mut file = self.open(path)?;
+        file.stays_still();
+        let mut settings = file.settings()?;
+        overrides.apply(&mut settings);
+        Ok((file, settings))
     }
 
     /// What the metadata of an image tell.

@@ -21,8 +21,8 @@ use text::text;
 
 /// List every effect: on or off, what calls for it, and what it costs
 ///
-/// Options override the settings of the scene file. Times are those of one sample per pixel of the film, made smaller if it has more than 128 x 128 pixels, or 256 x 256 where a
-/// graphics card renders. Bytes are those of the film in its own size.
+/// Options override the settings of the scene file. Times are those of one sample per pixel of the film, made smaller if it has more
+/// than 128 x 128 pixels, or 256 x 256 where a graphics card renders. Bytes are those of the film in its own size.
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene file (.toml, .gltf, .glb) or model (.obj, .ply)
@@ -100,10 +100,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     if !args.no_measure && !is_cold() {
         return run_cold();
     }
-    let mut file = args.choices.open(&args.scene)?;
-    file.stays_still();
-    let mut settings = file.settings()?;
-    args.overrides.apply(&mut settings);
+    let (file, settings) = args.choices.open_at_rest(&args.scene, &args.overrides)?;
     settings.validate()?;
     let scene = file.load()?.with(|own| *own = settings);
     let warnings = scene.warnings.clone();

@@ -194,10 +194,7 @@ pub fn run(args: &Args) -> Result<Exit> {
 /// # Errors
 /// Of usage and input.
 pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
-    let mut file = args.choices.open(&args.scene)?;
-    file.stays_still();
-    let mut settings = file.settings()?;
-    args.overrides.apply(&mut settings);
+    let (file, mut settings) = args.choices.open_at_rest(&args.scene, &args.overrides)?;
     if let Some([x, y]) = args.pixel {
         settings.allocate = Allocate::default();
         if x >= settings.width || y >= settings.height {

@@ -60,11 +60,8 @@ pub struct Moving<'a> {
 
 impl<'a> Moving<'a> {
     /// Of a scene that shows the frame that is judged.
-    ///
-    /// # Errors
-    /// Those of [`Animation::at`].
-    pub fn new(scene: &Scene, motion: &'a Motion) -> Result<Self> {
-        Ok(Self { scene: scene.clone(), motion, moves: Moves::of(&motion.animation) })
+    pub fn new(scene: &Scene, motion: &'a Motion) -> Self {
+        Self { scene: scene.clone(), motion, moves: Moves::of(&motion.animation) }
     }
 
     /// The frames that a run renders; the last is judged.

@@ -30,6 +30,11 @@ impl Point {
         Self { method, command, runs, warm_up, device_bytes, summary, failed: None, is_other: false }
     }
 
+    /// Whether it failed here; a picture of another renderer stays what it is.
+    pub fn can_be_tried_again(&self) -> bool {
+        self.failed.is_some() && !self.is_other
+    }
+
     /// Whether it belongs on a curve of error against time: it has runs, and samples per pixel.
     pub fn is_compared(&self) -> bool {
         self.failed.is_none() && self.method.spp > 0 && !self.runs.is_empty()

@@ -73,9 +73,7 @@ impl<R: Runs> Measuring<'_, R> {
             (false, true) => Ended::Stopped,
             (false, false) => Ended::Budget,
         };
-        // What failed is tried again by the same command.
-        let complete =
-            ended == Ended::Complete && !self.points.iter().any(|point| point.failed.is_some() && !point.is_other);
+        let complete = ended == Ended::Complete && !self.points.iter().any(Point::can_be_tried_again);
         let document = document(&self.outline, self.points, reference, complete);
         (document, images(self.pictures, reference), ended)
     }

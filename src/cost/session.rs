@@ -50,7 +50,7 @@ impl<'a> Session<'a> {
     /// Begins with no renderer. A scene with `motion` shows the frame that is judged.
     ///
     /// # Errors
-    /// [`Error::Device`], also for a device that does not tell times; those of [`Moving::new`].
+    /// [`Error::Device`], also for a device that does not tell times.
     pub fn new(
         gpu: &'a Gpu,
         scene: &'a Scene,
@@ -60,7 +60,7 @@ impl<'a> Session<'a> {
     ) -> Result<Self> {
         gpu.check_clock()?;
         let warm = shots.iter().map(|_| None).collect();
-        let moving = motion.map(|motion| Moving::new(scene, motion)).transpose()?;
+        let moving = motion.map(|motion| Moving::new(scene, motion));
         Ok(Self { gpu, scene, moving, candidates, shots, warm, frame: FrameResources::new(gpu)? })
     }
 

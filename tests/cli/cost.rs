@@ -282,6 +282,7 @@ fn a_point_that_fails_is_told_and_the_others_are_measured() {
     let output = limited.args(["--variant", "--min-spp 8 --max-spp 4"]).output().unwrap();
     let printed = text(&output, 6);
     assert!(printed.contains("failed: both, min-spp 8 --max-spp 4, 4 spp: min-spp is 8"), "{printed}");
+    assert!(printed.contains("not complete: points failed; the same command tries them again"), "{printed}");
     let read = || document(&folder, "all/cost.json");
     let found = read();
     assert!(!found.complete && point(&found, "both, 4 spp").runs.len() == 2, "what failed may be tried again");

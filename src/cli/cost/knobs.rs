@@ -68,13 +68,13 @@ pub fn steps(candidate: &Candidate) -> Vec<String> {
     KNOBS.iter().filter(|knob| knob.is_read_by(candidate)).flat_map(|knob| knob.steps(candidate)).collect()
 }
 
-/// Whether a point reads a setting that another one changes. What no knob names is read by all. A noise threshold gives a policy that
-/// learns to those that do not: points of that other policy.
+/// Whether a point reads a setting that another one changes. What no knob names is read by all. One of another policy, which a noise
+/// threshold chooses in place of one that does not learn, is no variant of this point.
 pub fn reads_change(point: &Candidate, other: &Candidate) -> bool {
-    let changed = |(own, others): (Entry, Entry)| (own.value != others.value).then_some(own.name);
     if point.settings.allocate.policy != other.settings.allocate.policy {
         return false;
     }
+    let changed = |(own, others): (Entry, Entry)| (own.value != others.value).then_some(own.name);
     let mut changed = entries(point).into_iter().zip(entries(other)).filter_map(changed);
     changed.any(|name| KNOBS.iter().filter(|knob| knob.name == name).all(|knob| knob.is_read_by(point)))
 }

@@ -85,25 +85,19 @@ impl Folder {
         self.files.borrow_mut().save(&[item], false);
     }
 
-    /// Renames the files of another measurement that is not complete, which a complete one would replace, so that it can go on.
+    /// Puts another measurement that is not complete, which a complete one would replace, into files of its own, where it can go on.
     ///
     /// # Errors
     /// [`Error::Output`].
     pub fn set_aside_other(&self, key: &str) -> Result<()> {
-        let json = self.path.join(NAMES[0]);
-        let is_other = |(file, document): &(PathBuf, Document)| *file == json && document.measurement.key != key;
-        if !self.begun.iter().any(is_other) {
-            return Ok(());
-        }
-        let partial = partial_name(&json);
-        let stem = partial.file_stem().unwrap_or_default().to_string_lossy();
-        let numbered = (2..).map(|number| partial.with_file_name(format!("{stem}-{number}.json")));
-        let free = std::iter::once(partial.clone()).chain(numbered).find(|file| !file.exists());
-        let free = free.expect("a folder has fewer files than there are numbers");
-        for from in NAMES.map(|name| self.path.join(name)).into_iter().filter(|from| from.exists()) {
-            let to = free.with_extension(from.extension().unwrap_or_default());
-            std::fs::rename(&from, &to)
-                .map_err(|e| Error::output(&from, format!("cannot be renamed to {}: {e}", to.display())))?;
+        let [own, beside @ ..] = NAMES.map(|name| self.path.join(name));
+        let other = self.begun.iter().find(|(file, document)| *file == own && document.measurement.key != key);
+        let Some((_, document)) = other else { return Ok(()) };
+        let place = output::write_new(&partial_name(&own), |stream| stream.write_all(&json(document)))?;
+        for from in beside.iter().filter(|from| from.exists()) {
+            let to = place.with_extension(from.extension().unwrap_or_default());
+            std::fs::rename(from, &to)
+                .map_err(|e| Error::output(from, format!("cannot be renamed to {}: {e}", to.display())))?;
         }
         Ok(())
     }
@@ -236,8 +230,11 @@ pub fn text(document: &Document, written: &[PathBuf]) -> String {
     text.extend(document.findings.iter().map(|finding| format!("{}\n", readable(&finding.text))));
     let missing = missing(document);
     if !document.complete {
-        let what = if missing > 0 { format!("{missing} runs") } else { "pictures".to_owned() };
-        text += &format!("not complete: {what} are missing; the same command goes on\n");
+        text += &match (missing, document.points.iter().any(Point::can_be_tried_again)) {
+            (0, true) => "not complete: points failed; the same command tries them again\n".to_owned(),
+            (0, false) => "not complete: pictures are missing; the same command goes on\n".to_owned(),
+            (_, _) => format!("not complete: {missing} runs are missing; the same command goes on\n"),
+        };
     }
     let files: Vec<_> = written.iter().map(|path| readable(&path.display().to_string())).collect();
     text + &format!("written: {}\n", files.join(", "))

@@ -30,10 +30,7 @@ pub struct Fresh {
 /// As a render of the scene; [`Error::Usage`] for an old profile of something else.
 pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     args.denoise.map(row).transpose()?;
-    let mut file = args.choices.open(&args.scene)?;
-    file.stays_still();
-    let mut settings = file.settings()?;
-    args.overrides.apply(&mut settings);
+    let (file, settings) = args.choices.open_at_rest(&args.scene, &args.overrides)?;
     settings.validate()?;
     // As of a render: without gaps to fill in there is nothing to do for `none`.
     let denoise = args.denoise.filter(|method| !method.is_none() || settings.indirect_stride > 1);

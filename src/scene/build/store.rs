@@ -82,9 +82,11 @@ pub fn store(sources: &mut Sources, plan: &Plan, scene: &Scene, geometry: &mut G
 
 /// What the materials of a scene read of all meshes, and which of these show materials of their own. Found once, for many meshes.
 struct Read<'a> {
-    /// Whether some material reads coordinates of textures, or second ones, or tangents.
+    /// Whether some material reads coordinates of textures.
     uvs: bool,
+    /// Whether some texture reads second ones.
     second: bool,
+    /// Whether some material needs tangents.
     tangents: bool,
     /// By the names of meshes that instances place: whether each of these gives a material.
     worn: HashMap<&'a str, bool>,
