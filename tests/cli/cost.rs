@@ -296,6 +296,18 @@ fn a_point_that_fails_is_told_and_the_others_are_measured() {
 }
 
 #[test]
+fn no_step_of_a_knob_contradicts_the_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut ablated = within(&folder, &format!("cost {} --width 8 --height 8 --reference-spp 64 -o all", scene()));
+    ablated.args("--allocate threshold --denoise none --spp 4 --repeats 2 --ablate --quiet".split(' '));
+    text(&ablated.args(["--with", "--min-spp 16"]).output().unwrap(), 0);
+    let options: Vec<_> =
+        document(&folder, "all/cost.json").points.into_iter().map(|point| point.method.options.concat()).collect();
+    let has = |option: &str| options.iter().any(|own| own == option);
+    assert!(has("--max-spp 32") && !has("--max-spp 8"), "min-spp may not exceed max-spp: {options:?}");
+}
+
+#[test]
 fn filters_are_measured_on_a_given_image() {
     let folder = tempfile::tempdir().unwrap();
     let render = |spp, name| {

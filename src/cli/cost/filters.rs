@@ -103,6 +103,8 @@ mod tests {
         assert_eq!(all, ["none", "atrous", "atrous --levels 3"], "nothing is filtered by none");
         let doubled = ["--denoise", "none,atrous,atrous", "--variant", "--levels 3", "--variant", "--levels 3"];
         assert_eq!(made(&doubled).unwrap(), all);
+        let read = made(&["--denoise", "atrous,guided", "--variant", "--radius 9"]).unwrap();
+        assert_eq!(read, ["atrous", "guided", "guided --radius 9"], "atrous reads no radius");
         for words in [
             ["--denoise", "none", "--with", "", "--variant", "--levels 3"],
             ["--denoise", "none,atrous", "--with", "--levels 3", "--variant", "--levels 3 "],
