@@ -276,7 +276,7 @@ impl Renderer {
     /// before keep theirs, done or not.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for a number that is not finite, and for a lens when the scene was loaded with a pinhole: the
+    /// [`crate::error::Error::Usage`] as [`scene::check_camera`] says, and for a lens when the scene was loaded with a pinhole: the
     /// kernels have no lens then. Make it by [`Renderer::specialised`] with the effect `lens`, or load the scene with one. Likewise for
     /// parallel rays and the effect `orthographic`.
     pub fn set_camera(&mut self, camera: Camera) -> Result<()> {

@@ -217,14 +217,26 @@ fn fit(
     }
 }
 
-/// Checks that a camera consists of finite numbers.
+/// By how much the length of a camera's `forward` may differ from 1.
+const UNIT: f32 = 1e-3;
+
+/// Checks that rays can leave a camera: its numbers are finite, `forward` is a unit vector, its axes span space, and no length is negative.
 ///
 /// # Errors
 /// [`Error::Usage`].
 pub fn check_camera(camera: &Camera) -> Result<()> {
     let numbers: &[f32] = bytemuck::cast_slice(std::slice::from_ref(camera));
-    match numbers.iter().all(|number| number.is_finite()) {
-        true => Ok(()),
-        false => Err(Error::Usage(format!("camera: give finite numbers alone, not {camera:?}"))),
-    }
+    let [right, up, forward] = [camera.right, camera.up, camera.forward].map(|axis| Vec3::from(axis).as_dvec3());
+    let volume = right.normalize_or_zero().cross(up.normalize_or_zero()).dot(forward);
+    let needs = match camera {
+        _ if !numbers.iter().all(|number| number.is_finite()) => "finite numbers alone",
+        _ if (forward.length() - 1.0).abs() > f64::from(UNIT) => "a unit vector as forward",
+        _ if volume == 0.0 => "right, up and forward that lie in no plane",
+        Camera { lens_radius, near, .. } if lens_radius.min(*near) < 0.0 => "a lens_radius and near of at least 0",
+        Camera { lens_radius, focus_distance, .. } if *lens_radius > 0.0 && *focus_distance <= 0.0 => {
+            "a focus_distance above 0 to a lens"
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::Usage(format!("camera: give {needs}, not {camera:?}")))
 }

@@ -447,7 +447,19 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
     assert!(Renderer::new(&GPU, &SCENE, &SCENE.settings, Outputs::default()).is_ok(), "control");
     let mut renderer = Renderer::new(&GPU, &SCENE, &SCENE.settings, Outputs::default()).unwrap();
     let camera = SCENE.camera([16, 16]).unwrap();
-    assert!(renderer.set_camera(Camera { near: f32::INFINITY, ..camera }).is_err());
+    for (camera, needs) in [
+        (Camera { near: f32::INFINITY, ..camera }, "finite numbers"),
+        (Camera { forward: [0.0, 0.0, -2.0], ..camera }, "a unit vector"),
+        (Camera { forward: [0.0; 3], ..camera }, "a unit vector"),
+        (Camera { right: [0.0; 3], ..camera }, "in no plane"),
+        (Camera { up: camera.right, ..camera }, "in no plane"),
+        (Camera { near: -1.0, ..camera }, "at least 0"),
+        (Camera { lens_radius: -0.1, ..camera }, "at least 0"),
+        (Camera { lens_radius: 0.1, focus_distance: 0.0, ..camera }, "a focus_distance above 0"),
+    ] {
+        let error = renderer.set_camera(camera).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains(needs), "{error}");
+    }
     assert!(renderer.set_camera(camera).is_ok());
 }
 
