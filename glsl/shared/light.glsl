@@ -133,22 +133,25 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
 struct SphericalTriangle {
     vec3 a, b, c;
     float solid_angle;
+    float volume; // of the parallelepiped that the three vectors span
 };
 
 SphericalTriangle spherical_triangle(vec3 a, vec3 e1, vec3 e2) {
     vec3 b = a + e1, c = a + e2;
     vec3 inverse = inversesqrt(max(vec3(dot(a, a), dot(b, b), dot(c, c)), 1e-37));
-    SphericalTriangle t = SphericalTriangle(a * inverse.x, b * inverse.y, c * inverse.z, 0.0);
-    float volume = abs(dot(t.a, cross(e1 * inverse.y, e2 * inverse.z)));
-    t.solid_angle = 2.0 * atan(volume, 1.0 + dot(t.a, t.b) + dot(t.b, t.c) + dot(t.c, t.a));
+    SphericalTriangle t = SphericalTriangle(a * inverse.x, b * inverse.y, c * inverse.z, 0.0, 0.0);
+    t.volume = abs(dot(t.a, cross(e1 * inverse.y, e2 * inverse.z)));
+    t.solid_angle = 2.0 * atan(t.volume, 1.0 + dot(t.a, t.b) + dot(t.b, t.c) + dot(t.c, t.a));
     return t;
 }
 
 // Between these limits sampling by solid angle lowers noise and is exact in single precision; elsewhere it is by area.
 const float MIN_SOLID_ANGLE = 3e-4, MAX_SOLID_ANGLE = 6.0; // steradians
+const float MIN_VOLUME = 1e-3; // per steradian: wide triangles that are closer lie in a plane with the point, up to rounding
 
-bool by_solid_angle(float solid_angle) {
-    return FX_LARGE_LAMPS && solid_angle > MIN_SOLID_ANGLE && solid_angle < MAX_SOLID_ANGLE;
+bool by_solid_angle(SphericalTriangle t) {
+    return FX_LARGE_LAMPS && t.solid_angle > MIN_SOLID_ANGLE && t.solid_angle < MAX_SOLID_ANGLE
+        && t.volume > MIN_VOLUME * t.solid_angle;
 }
 
 // Samples a direction uniformly by solid angle (Arvo 1995): u.x cuts off the triangle `a`, `b`, d with d on the arc from `a` to
@@ -166,29 +169,34 @@ vec3 sample_spherical_triangle(SphericalTriangle t, vec2 u) {
     return (1.0 - rest) * t.b + sqrt(rest * (2.0 - rest)) * across * inversesqrt(max(dot(across, across), 1e-30));
 }
 
+// Where the shadow ray to a lamp `distance` away ends, so that it does not meet the lamp: `clearance` before the lamp's plane, which it
+// meets at an angle of this cosine. What the lamp brings is computed from the lamp itself: from a point moved off it, one that is close or
+// wide would look smaller than it counts.
+float distance_before(float distance, float clearance, float cosine) {
+    return max(distance - clearance / max(cosine, 1e-6), 0.5 * distance);
+}
+
 void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     vec2 bary = warp_triangle(u);
     vec3 a = light.a, e1 = light.b - a, e2 = light.c - a;
     float doubled_area;
     vec3 n = unit_vector(cross(e1, e2), doubled_area);
-    float solid_angle = 0.0;
+    SphericalTriangle seen;
     if (FX_LARGE_LAMPS) {
-        SphericalTriangle seen = spherical_triangle(a - p, e1, e2);
-        solid_angle = seen.solid_angle;
+        seen = spherical_triangle(a - p, e1, e2);
         vec3 w = sample_spherical_triangle(seen, u);
         vec3 q = dot(a - p, n) / dot(w, n) * w - (a - p);
         vec2 at = clamp(vec2(dot(cross(q, e2), n), dot(cross(e1, q), n)) / doubled_area, 0.0, 1.0);
-        if (by_solid_angle(solid_angle)) bary = at;
+        if (by_solid_angle(seen)) bary = at;
     }
     vec3 on_light = a + bary.x * e1 + bary.y * e2;
-    // The point is offset to the side that emits towards `p`.
     bool two_sided = FX_TWO_SIDED_LAMPS && (Material_flags(materials, light.material) & MATERIAL_EMITS_BEHIND) != 0u;
-    if (two_sided && dot(n, a - p) > 0.0) n = -n;
-    vec3 to_light = on_light + plane_clearance(n, abs(a), e1, e2) * n - p;
-    float d2 = dot(to_light, to_light);
-    s.distance = sqrt(d2);
-    s.direction = to_light / s.distance;
+    if (two_sided && dot(n, a - p) > 0.0) n = -n; // the side that emits towards `p`
+    vec3 to_light = on_light - p;
+    float d2 = dot(to_light, to_light), distance = sqrt(d2);
+    s.direction = to_light / distance;
     float cosine = -dot(n, s.direction);
+    s.distance = distance_before(distance, plane_clearance(n, abs(a), e1, e2), cosine);
     vec3 radiance = light.value;
     // What belongs to corners is stored in the order of the triangle.
     vec2 stored = light.kind == LIGHT_MIRRORED ? bary.yx : bary;
@@ -206,7 +214,7 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     if (FX_ALPHA_MASKS) radiance *= surface_opacity(light.material, light.triangle, stored);
     bool lit = cosine > 0.0 && d2 > 0.0;
     s.pdf = lit ? light.probability * 2.0 * d2 / (cosine * doubled_area) : 0.0;
-    if (lit && by_solid_angle(solid_angle)) s.pdf = light.probability / solid_angle;
+    if (lit && by_solid_angle(seen)) s.pdf = light.probability / seen.solid_angle;
     s.radiance = lit ? radiance / s.pdf : vec3(0.0);
 }
 
@@ -227,14 +235,16 @@ void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     float along = distance * w.z - sqrt(max(radius * radius - distance * distance * sine2, 0.0));
     vec2 across = w.xy * (along / radius);
     vec3 n = basis_from_normal(axis) * vec3(across, -sqrt(max(1.0 - dot(across, across), 0.0)));
-    vec3 to_light = to_centre + (radius + plane_clearance(n, abs(light.a), vec3(radius), vec3(0.0))) * n;
+    vec3 to_light = to_centre + radius * n;
     float d2 = dot(to_light, to_light);
-    s.distance = sqrt(d2);
-    s.direction = to_light / s.distance;
-    bool lit = cap > 0.0 && d2 > 0.0 && dot(n, s.direction) < 0.0;
+    distance = sqrt(d2);
+    s.direction = to_light / distance;
+    float cosine = -dot(n, s.direction);
+    s.distance = distance_before(distance, plane_clearance(n, abs(light.a), vec3(radius), vec3(0.0)), cosine);
+    bool lit = cap > 0.0 && d2 > 0.0 && cosine > 0.0;
     s.pdf = lit ? light.probability / (2.0 * PI * cap) : 0.0;
     vec3 radiance = light.value;
-    if (FX_CLEARCOAT) radiance *= coat_lets_out(light.material, vec4(0.0), -dot(n, s.direction)); // lamps with pictures are no spheres
+    if (FX_CLEARCOAT) radiance *= coat_lets_out(light.material, vec4(0.0), cosine); // lamps with pictures are no spheres
     s.radiance = lit ? radiance / s.pdf : vec3(0.0);
 }
 
@@ -374,8 +384,8 @@ float table_pdf(float density, Surface s, vec3 origin, float t, float cosine) {
     if (FX_LARGE_LAMPS) {
         float doubled_area;
         unit_vector(cross(s.e1, s.e2), doubled_area);
-        float solid_angle = spherical_triangle(s.corner - origin, s.e1, s.e2).solid_angle;
-        if (by_solid_angle(solid_angle)) return density * 0.5 * doubled_area / solid_angle;
+        SphericalTriangle seen = spherical_triangle(s.corner - origin, s.e1, s.e2);
+        if (by_solid_angle(seen)) return density * 0.5 * doubled_area / seen.solid_angle;
     }
     return density * t * t / max(cosine, 1e-20);
 }

@@ -6,7 +6,7 @@ use crate::math::warp::{
     basis_from_normal, circle_point, sine_cosine, warp_cone, warp_sphere, warp_tent, warp_triangle,
 };
 use crate::scene::{Environment, Scene};
-use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE};
+use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, MIN_VOLUME};
 use crate::twins::light_tree::{Choice, choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, coat_lets_out, plane_clearance, unit_vector};
@@ -110,6 +110,8 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
 struct SphericalTriangle {
     corners: [Vec3; 3],
     solid_angle: f32,
+    /// Of the parallelepiped that the unit vectors to the corners span.
+    volume: f32,
 }
 
 impl SphericalTriangle {
@@ -118,12 +120,15 @@ impl SphericalTriangle {
         let [a, b, c] = [a * inverse[0], (a + e1) * inverse[1], (a + e2) * inverse[2]];
         let volume = a.dot((e1 * inverse[1]).cross(e2 * inverse[2])).abs();
         let solid_angle = 2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
-        Self { corners: [a, b, c], solid_angle }
+        Self { corners: [a, b, c], solid_angle, volume }
     }
 
     /// Whether it is sampled so, and not by area.
     fn by_solid_angle(&self, scene: &Scene) -> bool {
-        scene.large_lamps && self.solid_angle > MIN_SOLID_ANGLE && self.solid_angle < MAX_SOLID_ANGLE
+        scene.large_lamps
+            && self.solid_angle > MIN_SOLID_ANGLE
+            && self.solid_angle < MAX_SOLID_ANGLE
+            && self.volume > MIN_VOLUME * self.solid_angle
     }
 
     /// A direction, uniform by solid angle (Arvo 1995).
@@ -138,6 +143,11 @@ impl SphericalTriangle {
         let across = d - d.dot(b) * b;
         (1.0 - rest) * b + (rest * (2.0 - rest)).sqrt() * across / across.length_squared().max(1e-30).sqrt()
     }
+}
+
+/// Where the shadow ray to a lamp `distance` away ends: `clearance` before the lamp's plane.
+fn distance_before(distance: f32, clearance: f32, cosine: f32) -> f32 {
+    (distance - clearance / cosine.max(1e-6)).max(0.5 * distance)
 }
 
 fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightSample {
@@ -156,11 +166,11 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     if scene.materials[light.material as usize].flags & MATERIAL_EMITS_BEHIND != 0 && n.dot(a - p) > 0.0 {
         n = -n;
     }
-    let to_light = on_light + plane_clearance(n, a.abs(), e1, e2) * n - p;
+    let to_light = on_light - p;
     let d2 = to_light.dot(to_light);
-    let distance = d2.sqrt();
-    let direction = to_light / distance;
+    let direction = to_light / d2.sqrt();
     let cosine = -n.dot(direction);
+    let distance = distance_before(d2.sqrt(), plane_clearance(n, a.abs(), e1, e2), cosine);
     let mut radiance = Vec3::from(light.value);
     let bary = if light.kind == LIGHT_MIRRORED { bary.yx() } else { bary };
     let image = scene.materials[light.material as usize].emission_texture;
@@ -206,14 +216,16 @@ fn sample_sphere_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightS
     let squared = radius * radius - distance * distance * w.xy().length_squared();
     let across = w.xy() * ((distance * w.z - squared.max(0.0).sqrt()) / radius);
     let n = basis_from_normal(axis) * across.extend(-(1.0 - across.length_squared()).max(0.0).sqrt());
-    let clearance = plane_clearance(n, centre.abs(), Vec3::splat(radius), Vec3::ZERO);
-    let to_light = to_centre + (radius + clearance) * n;
+    let to_light = to_centre + radius * n;
     let distance = to_light.length();
     let direction = to_light / distance;
-    let lit = cap > 0.0 && distance > 0.0 && n.dot(direction) < 0.0;
+    let cosine = -n.dot(direction);
+    let lit = cap > 0.0 && distance > 0.0 && cosine > 0.0;
+    let clearance = plane_clearance(n, centre.abs(), Vec3::splat(radius), Vec3::ZERO);
+    let distance = distance_before(distance, clearance, cosine);
     let pdf = if lit { light.probability / (2.0 * PI * cap) } else { 0.0 };
     // Lamps whose coat has a picture are no spheres.
-    let coat = coat_lets_out(&scene.materials[light.material as usize], -n.dot(direction), |_| Vec4::ONE);
+    let coat = coat_lets_out(&scene.materials[light.material as usize], cosine, |_| Vec4::ONE);
     LightSample {
         direction,
         distance,

@@ -306,6 +306,34 @@ fn a_lamp_that_shines_from_behind_is_as_clear_as_from_its_front() {
     }
 }
 
+/// A square lamp of half side `a`, `h` above the middle of a floor: seen from there, the irradiance is 4 q atan(q) with q = a / sqrt(a² + h²).
+/// Shadow rays end before the lamp, far from the origin by more; what it brings is still that of the lamp itself. A lamp so wide that
+/// single precision finds it in one plane with the point is sampled by area.
+#[test]
+fn lamps_far_from_the_origin_and_very_wide_ones_bring_what_their_size_does() {
+    for (o, h, a, tolerance) in [(8192.0, 1.0 / 32.0, 0.5, 0.003), (0.0, 0.25, 1e4, 0.001), (0.0, 0.25, 1000.0, 0.001)]
+    {
+        let (floor, lamp) = (f64::max(a, 1.0), [o, o + h, o]);
+        let scene = Workplace::new().scene(&format!(
+            "[film]\nwidth = {SIDE}\nheight = {SIDE}\n[camera]\nposition = [{o:?}, {:?}, {o:?}]\ntarget = [{o:?}, {o:?}, {o:?}]\n\
+             up = [0.0, 0.0, -1.0]\northographic = {:?}\n[render]\nspp = 64\nmax_depth = 2\n[[material]]\nname = 'floor'\n\
+             color = {ALBEDO}\n[[material]]\nname = 'lamp'\ncolor = 0.0\nemission = 1.0\n[[mesh]]\nshape = 'rectangle'\n\
+             material = 'floor'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = {floor:?}, translate = [{o:?}, {o:?}, {o:?}] }}\n\
+             [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
+             transform = {{ rotate = [90.0, 0.0, 0.0], scale = {a:?}, translate = {lamp:?} }}\n",
+            o + h / 2.0,
+            h / 100.0
+        ));
+        let q = a / a.hypot(h);
+        let expected = ALBEDO / PI * 4.0 * q * q.atan();
+        let (found, _) = mean_and_variance(&rendered(&scene));
+        assert!(
+            (found / expected - 1.0).abs() < tolerance,
+            "{found}, expected {expected}: {a} at {h}, {o} from the origin"
+        );
+    }
+}
+
 /// Every sample meets the sun by its shadow ray, and the sky where the path leaves the scene.
 #[test]
 fn sun_and_sky_of_one_colour_leave_no_noise_on_open_ground() {
