@@ -1,5 +1,5 @@
 //! Options shared by commands that run on a device or write pictures.
-use super::{complain, finite, print, print_json};
+use super::{complain, finite, print, print_json, quoted};
 use crate::error::Result;
 use crate::gpu::{self, DeviceOptions, Gpu, Tracing};
 use crate::image::{WriteOptions, tone::ToneMap};
@@ -74,6 +74,11 @@ impl Common {
             (false, true) => Ok(()),
             (false, false) => print(&text()),
         }
+    }
+
+    /// The option that selects the device, for a printed command that is to run there too; empty where none is given.
+    pub fn device_words(&self) -> String {
+        self.device.as_ref().map_or(String::new(), |device| format!(" --device {}", quoted(device)))
     }
 
     /// Opens the device that the options select, to trace rays as `tracing` says. What is compiled is kept for the next run.

@@ -47,7 +47,8 @@ fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> R
     let settings = args.choices.open(path)?.settings()?;
     let judged = motion.as_ref().map(|motion| motion.judged);
     let scene_words = quoted(&path.display().to_string()) + &args.choices.words();
-    let command = |candidate| points::command(&scene_words, judged, &settings, candidate, gpu.traces_by_ray_query());
+    let (ray_queries, device) = (gpu.traces_by_ray_query(), args.common.device_words());
+    let command = |candidate| points::command(&scene_words, judged, &settings, candidate, ray_queries, &device);
     Ok(Plan {
         scene: scene_info(path, [width, height], judged),
         commands: candidates.iter().map(command).collect(),

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 pub struct FilterCandidate {
     /// The filter.
     pub filter: filter::Method,
-    /// Its settings, which are scaled to the image.
+    /// Its settings; those at their defaults are scaled to the image.
     pub settings: FilterSettings,
     /// Options of `tallow filter` that gave these settings.
     pub options: Vec<String>,
@@ -142,7 +142,7 @@ impl Runs for Filters<'_> {
 impl Filters<'_> {
     fn filtered(&self, point: usize, seed: u32) -> Result<Measured> {
         let FilterCandidate { filter, settings, .. } = &self.plan.candidates[point];
-        let scaled = |scales: &filter::Scales| settings.scaled_by(scales);
+        let scaled = |scales: &filter::Scales| settings.scaled_at_defaults(scales);
         let recipe = Recipe { settings: &scaled, ..Recipe::new(*filter) };
         let filtered = timed(self.gpu, self.layers.upload(self.gpu)?, &recipe)?;
         let mut run = Run {

@@ -32,7 +32,7 @@ pub struct Candidate {
     pub settings: Settings,
     /// The filter behind the render.
     pub filter: Option<filter::Method>,
-    /// Settings of the filter, which are scaled to the image.
+    /// Settings of the filter; those at their defaults are scaled to the image.
     pub filter_settings: FilterSettings,
     /// How samples of earlier frames are carried, if they are.
     pub carries: Option<Reproject>,

@@ -6,7 +6,7 @@ use crate::allocate::POLICIES;
 use crate::error::{Error, Result};
 use crate::image::{self, Picture, input};
 use serde::Deserialize;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Bytes of memory that a byte of a table takes at most while it is read.
@@ -65,6 +65,13 @@ pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
         Ok(OtherRun { method, seed, ms, image: path.parent().unwrap_or(Path::new("")).join(image) })
     };
     let runs: Vec<OtherRun> = csv::Reader::from_reader(&text[..]).deserialize().map(run).collect::<Result<_>>()?;
+    let mut labels = BTreeMap::new();
+    for run in &runs {
+        let first = labels.entry(run.method.label()).or_insert(&run.method);
+        if **first != run.method {
+            return Err(wrong(format!("two methods are called {}: change one of the names", run.method.label())));
+        }
+    }
     let mut seen = HashSet::new();
     match runs.iter().find(|run| !seen.insert((run.method.label(), run.seed))) {
         Some(again) => {
@@ -184,6 +191,10 @@ mod tests {
         says("method,filter,spp,seed,ms,image\nA,none,0,7,1,a.exr\n", "A took 0 samples a pixel");
         says("method,filter,spp,seed,ms,image\nuniform,none,4,7,1,a.exr\n", "uniform is a policy");
         says("method,filter,spp,seed,ms,image\nA,none,4,7,1,a.exr\nA,none,4,7,2,b.exr\n", "A, 4 spp has seed 7 twice");
+        says(
+            "method,filter,spp,seed,ms,image\nA + x,none,4,7,1,a.exr\nA,x,4,8,2,b.exr\n",
+            "two methods are called A + x, 4 spp",
+        );
         says("method,filter,spp,seed,ms,image\nA,none,4,7\n", "line: 2");
         says("method,spp\nA,4\n", "missing field");
     }

@@ -193,7 +193,7 @@ impl<'a> Session<'a> {
             let picture = renderer.picture()?.finite().map_err(Error::Device)?;
             return Ok(Measured { point, run, picture, warm_up: *costs, device_bytes: *device_bytes });
         };
-        let settings = |scales: &filter::Scales| candidate.filter_settings.scaled_by(scales);
+        let settings = |scales: &filter::Scales| candidate.filter_settings.scaled_at_defaults(scales);
         let recipe = Recipe { settings: &settings, ..Recipe::new(method) };
         let filtered = timed(self.gpu, Noisy::of_film(renderer)?, &recipe)?;
         let warm_up = add_filter(&mut run, costs, &filtered);

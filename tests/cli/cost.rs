@@ -339,6 +339,17 @@ fn filters_are_measured_on_a_given_image() {
     assert!(within(&folder, &format!("{words} --quiet")).status().unwrap().success());
     let picture = |name: &str| image::read(&folder.path().join(name)).unwrap().picture(None).unwrap();
     assert!((relmse(&picture("point.exr"), &picture("clean.exr")) / error(2) - 1.0).abs() < 1e-9);
+    // What is given of the scales that are taken from the image is measured as it is filtered.
+    let words = "cost --filter-only noisy.exr --reference clean.exr --denoise svgf --variant=--extent=0.02 --device 0 \
+                 --repeats 2 -o scaled";
+    text(&within(&folder, words).output().unwrap(), 0);
+    let scaled = self::document(&folder, "scaled/cost.json");
+    let errors: Vec<_> = scaled.points.iter().map(|point| point.runs[0].errors.relmse.unwrap()).collect();
+    let words = scaled.points[1].command.strip_prefix("tallow ").unwrap();
+    assert!(words.contains("--extent 0.02 --device 0 "), "{words}");
+    assert!(within(&folder, &format!("{words} --quiet")).status().unwrap().success());
+    let filtered = relmse(&picture("point.exr"), &picture("clean.exr"));
+    assert!((filtered / errors[1] - 1.0).abs() < 1e-9 && errors[1] != errors[0], "{filtered}, {errors:?}");
     // Beside itself an image in other primaries has no error.
     let mut wide = image::read(&folder.path().join("noisy.exr")).unwrap();
     wide.primaries = Some(REC2020);

@@ -35,7 +35,8 @@ pub fn run(args: &Args, image: &Path) -> Result<Exit> {
 
 /// Every filter, with its defaults and with the options of each variant that changes it.
 fn candidates(args: &Args, image: &Path) -> Result<Vec<FilterCandidate>> {
-    let of = |filter: &Method, variant: &str| candidate(image, *filter, [args.with.trim(), variant.trim()]);
+    let device = args.common.device_words();
+    let of = |filter: &Method, variant: &str| candidate(image, *filter, [args.with.trim(), variant.trim()], &device);
     let plain: Vec<_> = args.denoise.iter().map(|filter| of(filter, "")).collect::<Result<_>>()?;
     let mut varied = Vec::new();
     for variant in &args.variants {
@@ -54,14 +55,14 @@ fn candidates(args: &Args, image: &Path) -> Result<Vec<FilterCandidate>> {
     Ok(all.filter(|candidate| known.insert((candidate.filter.name(), candidate.options.clone()))).collect())
 }
 
-fn candidate(image: &Path, filter: Method, [shared, variant]: [&str; 2]) -> Result<FilterCandidate> {
+fn candidate(image: &Path, filter: Method, [shared, variant]: [&str; 2], device: &str) -> Result<FilterCandidate> {
     let settings = overrides(variant)?.settings(overrides(shared)?.settings(FilterSettings::default()));
     settings.validate()?;
     let options = Some(variant.to_owned()).filter(|variant| !variant.is_empty());
     let path = quoted(&image.display().to_string());
     let words = grid::options(&FilterSettings::default().entries(), &settings.entries());
     let words = words.into_iter().map(|word| format!(" {word}")).collect::<String>();
-    let command = format!("tallow filter {path} --filter {}{words} -o point.exr", filter.name());
+    let command = format!("tallow filter {path} --filter {}{words}{device} -o point.exr", filter.name());
     Ok(FilterCandidate { filter, settings, options: options.into_iter().collect(), command })
 }
 

@@ -122,17 +122,18 @@ fn possible(variants: Vec<Candidate>, notes: &mut Vec<String>) -> Result<Vec<Can
 }
 
 /// The command that renders a point's first image of `scene`, which are words for a shell. Unfiltered points go to .hdr: for an .exr more
-/// layers are kept, which takes longer than what was measured. Filters with settings of their own run behind the render, to the same bits.
+/// layers are kept, which takes longer than what was measured. `device` is the option that chooses it, if any. Filters with settings of their own run behind the render, to the same bits.
 pub fn command(
     scene: &str,
     judged: Option<JudgedFrame>,
     from: &Settings,
     candidate: &Candidate,
     ray_queries: bool,
+    device: &str,
 ) -> String {
     let words = |words: Vec<String>| words.into_iter().map(|word| format!(" {word}")).collect::<String>();
     let tracing = if ray_queries { " --tracing ray-query" } else { "" };
-    let settings = words(grid::options(&from.entries(), &candidate.settings.entries())) + tracing;
+    let settings = words(grid::options(&from.entries(), &candidate.settings.entries())) + tracing + device;
     let (render, number) = match judged {
         None => (format!("tallow render {scene}{settings}"), String::new()),
         Some(judged) => {
@@ -152,7 +153,7 @@ pub fn command(
     match &words(grid::options(&FilterSettings::default().entries(), &candidate.filter_settings.entries()))[..] {
         "" => format!("{render} --denoise {filter} -o {}.exr", out("point")),
         own => format!(
-            "{render} -o {}.exr && tallow filter noisy{number}.exr --filter {filter}{own} -o point{number}.exr",
+            "{render} -o {}.exr && tallow filter noisy{number}.exr --filter {filter}{own}{device} -o point{number}.exr",
             out("noisy")
         ),
     }

@@ -54,6 +54,15 @@ impl FilterSettings {
         Self { edge: scales.applied_to(self.edge), ..self }
     }
 
+    /// The same, but of what is not at its default already: that was asked for, and stays.
+    pub fn scaled_at_defaults(self, scales: &Scales) -> Self {
+        let (own, usual, found) = (self.edge, EdgeSettings::default(), scales.applied_to(self.edge));
+        let of = |read: fn(&EdgeSettings) -> f32| if read(&own) == read(&usual) { read(&found) } else { read(&own) };
+        let edge =
+            EdgeSettings { intensity: of(|e| e.intensity), usual: of(|e| e.usual), extent: of(|e| e.extent), ..own };
+        Self { edge, ..self }
+    }
+
     /// The same for this image.
     pub fn scaled_to(self, input: &FilterInput) -> Self {
         self.scaled_by(&Scales::of(input))
