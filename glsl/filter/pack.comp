@@ -17,5 +17,6 @@ void main() {
     Guide hit = Guide_load(guide, i);
     vec3 position = hit.position;
     position = finite(position) ? clamp(position, -FARTHEST, FARTHEST) : vec3(0.0);
-    place[i] = uvec4(floatBitsToUint(position), packed_normal(hit.normal));
+    uvec3 bits = floatBitsToUint(position);
+    place[i] = uvec4(bits.x & ~1u, bits.yz, packed_normal(hit.normal)); // the lowest bit is for cells: shared/smoothing_cell.glsl
 }

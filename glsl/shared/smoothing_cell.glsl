@@ -9,12 +9,12 @@ ivec2 smoothing_cells_of(uvec2 size) {
     return (ivec2(size) + SMOOTHING_CELL - 1) / SMOOTHING_CELL;
 }
 
-// The lowest bit of the first coordinate tells whether a pixel of the cell is known.
+// The lowest bit of the first coordinate, which packed pixels leave at 0, tells whether a pixel of the cell is known.
 uvec4 pack_cell(uvec4 place, bool known) {
     return uvec4(bitfieldInsert(place.x, uint(known), 0, 1), place.yzw);
 }
 
 // The surface that a cell stands for.
 Pixel unpack_cell(uvec4 cell) {
-    return unpack_pixel(vec4(0.0, 0.0, 0.0, float(cell.x & 1u)), cell);
+    return unpack_pixel(vec4(0.0, 0.0, 0.0, float(cell.x & 1u)), uvec4(cell.x & ~1u, cell.yzw));
 }

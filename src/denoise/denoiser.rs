@@ -45,6 +45,11 @@ impl Denoiser {
             let lack = "direct light apart: make the renderer with Outputs::split_light";
             return Err(Error::Usage(format!("a frame cannot be filtered without {lack}")));
         }
+        if !apart && noisy.holds().indirect_stride > 1 {
+            let what =
+                "what is filtered is light that not every pixel has (indirect_stride): choose Demodulation::Light";
+            return Err(Error::Usage(what.to_owned()));
+        }
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
         let allocate = &renderer.settings().allocate;
         let in_paint = apart && !allocate.is_even() && allocate.min_spp == 0;

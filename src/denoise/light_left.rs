@@ -12,7 +12,9 @@ const BY_CHANCE: f64 = 3.0;
 pub fn note_of_lost_light(aovs: &Aovs, clean: &Colour) -> Option<String> {
     let noisy = aovs.get(Aov::Colour)?;
     let [mut before, mut after, mut squares] = [0.0; 3];
-    for i in (0..clean[0].len()).filter(|&i| aovs.holds(i)) {
+    // Pixels without a sample have no light before, but what was filled in behind.
+    let sampled = |&i: &usize| aovs.holds(i) && aovs.samples(i).is_none_or(|samples| samples > 0.0);
+    for i in (0..clean[0].len()).filter(sampled) {
         let (noisy, variance) = (noisy.at(i), aovs.variance(i)?);
         if noisy.iter().chain(&variance).all(|v| v.is_finite()) {
             before += noisy.map(f64::from).iter().sum::<f64>();
@@ -31,8 +33,8 @@ pub fn note_of_lost_light(aovs: &Aovs, clean: &Colour) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Film;
     use crate::image::aov::Names;
+    use crate::image::{Film, Samples};
 
     /// Of 100 pixels of 1 whose means have this deviation: their sum has one of ten times that.
     #[test]
@@ -45,5 +47,17 @@ mod tests {
         };
         assert_eq!(told(0.5, 0.84).map(|note| note.starts_with("light: 84 % of it is left")), Some(true));
         assert_eq!([told(0.5, 0.86), told(0.1, 0.96), told(0.1, 1.2), told(0.0, 0.5)], [const { None }; 4]);
+    }
+
+    /// Half of the pixels have no sample, but come out as bright as the others, of which half of the light is left.
+    #[test]
+    fn what_fills_pixels_without_a_sample_makes_up_for_no_loss() {
+        let mut film = Film::new(10, 10);
+        let half: Vec<_> = (0..100).map(|i| (i % 2) as f32).collect();
+        film.add_vec3("", ["R", "G", "B"], &half.iter().map(|&v| [v; 3]).collect::<Vec<_>>());
+        film.add_vec3("variance", ["R", "G", "B"], &half.iter().map(|&v| [0.01 * v; 3]).collect::<Vec<_>>());
+        film.add("samples", Samples::F32(half));
+        let note = note_of_lost_light(&Aovs::find(&film, &Names::new()).unwrap(), &[0; 3].map(|_| vec![0.5; 100]));
+        assert!(note.as_ref().is_some_and(|note| note.starts_with("light: 50 % of it is left")), "{note:?}");
     }
 }

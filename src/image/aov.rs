@@ -198,10 +198,13 @@ impl<'a> Aovs<'a> {
 
     /// Leaves out numbers of samples where no pixel has any: nothing would be left to filter.
     fn check_samples(&mut self) {
-        let has_some = |plane: &Plane| (0..self.film.pixels()).any(|i| self.holds(i) && sound(plane.at(i)[0]) > 0.0);
-        if self.planes.get(&Aov::Samples).is_some_and(|plane| !has_some(plane)) {
-            self.planes.remove(&Aov::Samples);
-            self.notes.push("samples: none in any pixel, which is not believed".to_owned());
+        for (aov, label) in [(Aov::Samples, "samples"), (Aov::ShareOfSamples, "share of the samples")] {
+            let has_some =
+                |plane: &Plane| (0..self.film.pixels()).any(|i| self.holds(i) && sound(plane.at(i)[0]) > 0.0);
+            if self.planes.get(&aov).is_some_and(|plane| !has_some(plane)) {
+                self.planes.remove(&aov);
+                self.notes.push(format!("{label}: none in any pixel, which is not believed"));
+            }
         }
     }
 
@@ -246,7 +249,7 @@ impl<'a> Aovs<'a> {
 
     /// Samples of a pixel, as far as the file or the user tells: its own, or those of all, which pbrt and Cycles write into the head.
     pub fn samples(&self, pixel: usize) -> Option<f32> {
-        let share = || self.scalar(Aov::ShareOfSamples, pixel).unwrap_or(1.0);
+        let share = || self.scalar(Aov::ShareOfSamples, pixel).map_or(1.0, sound);
         self.scalar(Aov::Samples, pixel).map(sound).or_else(|| Some(share() * self.samples_of_all?))
     }
 
@@ -511,5 +514,16 @@ mod tests {
             assert_eq!(of(none), ([None; 4], true));
         }
         assert_eq!(of([8.0, -1.0, f32::NAN, 0.0]), ([Some(8.0), Some(0.0), Some(0.0), Some(0.0)], false));
+        // Shares of what the head of the file tells, likewise.
+        let share = |shares: [f32; 4]| {
+            let mut film = Film::new(2, 2);
+            film.add_vec3("V.Combined", ["R", "G", "B"], &[[1.0; 3]; 4]);
+            film.add("V.Debug Sample Count.X", Samples::F32(shares.to_vec()));
+            film.metadata.insert("cycles.V.samples".to_owned(), "64".to_owned());
+            let found = Aovs::find(&film, &Names::new()).unwrap();
+            [0, 1, 2, 3].map(|i| found.samples(i))
+        };
+        assert_eq!(share([0.0; 4]), [Some(64.0); 4]);
+        assert_eq!(share([0.5, -1.0, f32::NAN, 0.0]), [Some(32.0), Some(0.0), Some(0.0), Some(0.0)]);
     }
 }

@@ -422,6 +422,12 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
     for demodulation in [Demodulation::Albedo, Demodulation::Off] {
         assert_eq!(refused(Outputs { split_light: false, ..Outputs::FILTERED }, "geometry", demodulation), None);
     }
+    let sparse = renderer_of(&gpu, [8, 8], Outputs::FILTERED, "uniform", 2, 0.0);
+    for demodulation in [Demodulation::Albedo, Demodulation::Off] {
+        let whole =
+            Denoiser::new(&gpu, &sparse, find("atrous").unwrap(), &FilterSettings::default(), demodulation).err();
+        has(whole.map(|e| e.to_string()), "not every pixel has (indirect_stride)");
+    }
     let renderer = renderer(&gpu, [8, 8], Outputs::FILTERED, "uniform");
     let wrong = FilterSettings::default().with(|s| s.edge.extent = -1.0);
     has(
@@ -462,5 +468,6 @@ fn what_no_binding_holds_is_refused_beforehand() {
     for size in long.chain([[50_000, rows + 1], [49_993, most / 49_993 + 1]]) {
         let refused = check_size(&gpu, size, 3).unwrap_err();
         assert!(refused.exit_code() == 4 && refused.to_string().contains(&most.to_string()), "{refused}");
+        assert!(refused.to_string().contains("the width counted up to a multiple of 8"), "{refused}");
     }
 }

@@ -1,8 +1,10 @@
 //! Compares the filters on the device with their CPU twins, and the twins with examples worked by hand.
 use crate::picture::{self, SIZES, apart, line, red};
 use crate::support::{assert_silent, gpu, hash};
-use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
-use tallow::gpu::{DeviceKind, Gpu};
+use tallow::denoise::filter::{
+    FILTERS, FilterInput, FilterSettings, GuidedSums, Planes, WaveletBasis, find, firefly, run,
+};
+use tallow::gpu::{DeviceKind, FrameResources, Gpu};
 use tallow::layout::vec4;
 
 #[test]
@@ -429,6 +431,36 @@ fn auto_trusts_variances_of_two_samples() {
         );
     }
     assert_silent(&gpu);
+}
+
+/// A cell of 2x2 pixels stands for the place of one of them, whose bits it keeps: any distance at all counts.
+#[test]
+fn cells_lie_where_their_pixels_do() {
+    let gpu = gpu();
+    for samples in [1.0, 2.0] {
+        let mut input = picture::noisy(25, 24);
+        for (i, (c, g)) in input.radiance.iter_mut().zip(&mut input.guide).enumerate() {
+            c[3] = samples;
+            g.position = [(i % 5) as f32 + 1.0 / 3.0, (i / 75) as f32, 1.0];
+        }
+        let settings = FilterSettings::default().scaled_to(&input).with(|s| s.edge.sigma_x = 0.0);
+        both(&gpu, "auto", &input, &settings);
+    }
+    assert_silent(&gpu);
+}
+
+/// Filters read neighbours while they write.
+#[test]
+fn an_output_that_is_the_radiance_is_refused() {
+    let gpu = gpu();
+    let input = picture::noisy(8, 8);
+    for row in FILTERS {
+        let planes = Planes::new(&gpu, &input).unwrap();
+        let filter = row.compile(&gpu, &FilterSettings::default(), planes.size).unwrap();
+        let one = Planes { output: planes.radiance.clone(), ..planes };
+        let error = gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| filter.record(rec, &one)).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains("a buffer of its own"), "{}: {error}", row.name);
+    }
 }
 
 /// A sphere in noisy light of about 2000 from the side, and in light of .1 without noise from all around.

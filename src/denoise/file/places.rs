@@ -17,8 +17,8 @@ pub(super) enum Places {
 }
 
 /// Depth along the mean normal. Visible surfaces face the camera, so that their mean normal points towards it, unless the image has
-/// both of its sides alike; then there is no depth. Hits are told from misses, which have no position, and lie 0.1 to 1.1 extents
-/// deep.
+/// both of its sides alike or no normals; then all depths are 1. Hits are told from misses, which have no position, and lie 0.1 to 1.1
+/// extents deep.
 pub(super) struct Axis {
     normal: Vec3,
     nearest: f32,
@@ -31,8 +31,10 @@ impl Places {
         match (aovs.get(Aov::Position).is_some(), aovs.get(Aov::Depth).is_some()) {
             (true, true) => Self::Both,
             (true, false) => {
-                notes.push("depth: made of the position, along the mean normal".to_owned());
-                Self::Positions(Axis::new(aovs))
+                let axis = Axis::new(aovs);
+                let how = if axis.normal == Vec3::ZERO { "the same for all" } else { "along the mean normal" };
+                notes.push(format!("depth: made of the position, {how}"));
+                Self::Positions(axis)
             }
             (false, true) => {
                 let how = "position: made of the depth, as if seen with a vertical field of view of 40 degrees";
@@ -82,7 +84,6 @@ impl Axis {
     }
 
     fn depth(&self, position: Vec3) -> f32 {
-        let known = position != Vec3::ZERO && self.normal != Vec3::ZERO;
-        if known { -position.dot(self.normal) - self.nearest + self.margin } else { 0.0 }
+        if position != Vec3::ZERO { -position.dot(self.normal) - self.nearest + self.margin } else { 0.0 }
     }
 }

@@ -12,7 +12,8 @@ pub struct FilterInput {
     /// rgb; w is the number of samples behind it. A pixel with w = 0, or with a NaN or an infinity, is unknown: no
     /// other pixel takes anything from it, and it is in-painted where the filter can.
     pub radiance: Vec<vec4>,
-    /// One per pixel; zero normals, positions and depths where there is nothing to be seen or nothing is known.
+    /// One per pixel; zero normals, positions and depths where there is nothing to be seen or nothing is known. `auto` also reads
+    /// `material`: [`NONE`](crate::layout::NONE) where nothing is hit or a lens blurs what is, else any other number.
     pub guide: Vec<Guide>,
     /// Variance of each pixel's mean, per channel.
     pub variance: Option<Vec<vec3>>,

@@ -99,6 +99,11 @@ impl Filter for Fitted {
                  {own:?}"
             )));
         }
+        if planes.radiance.raw().handle == planes.output.raw().handle {
+            let what =
+                "radiance and output are one buffer: filters read neighbours, give the output a buffer of its own";
+            return Err(Error::Usage(what.to_owned()));
+        }
         self.filter.record(rec, planes)
     }
 
@@ -112,7 +117,7 @@ pub trait Filter: Send + Sync {
     /// radiance\[P\], guide\[P\], variance\[P\] -> output\[P\]
     ///
     /// # Errors
-    /// [`Error::Usage`] for planes of another size, [`Error::Device`] when the image is too large for the device.
+    /// [`Error::Usage`] for planes of another size, and for an output that is the radiance; [`Error::Device`] when the image is too large for the device.
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()>;
 
     /// Where the filter estimates its own error, what its last run left there: of each pixel the mean squared error of what came
@@ -132,9 +137,9 @@ pub struct Planes {
     pub guide: Buffer<Guide>,
     /// Holds the mean albedo of the samples of every pixel that has any.
     pub light: Option<Buffer<PixelLight>>,
-    /// One element where there is none.
+    /// Variance of each pixel's mean, where it is known.
     pub variance: Option<Buffer<vec3>>,
-    /// rgb, and the samples behind it: 1 where a pixel was in-painted, 0 where nothing reached it.
+    /// rgb, and the samples behind it: 1 where a pixel was in-painted, 0 where nothing reached it. A buffer of its own.
     pub output: Buffer<vec4>,
 }
 
@@ -180,8 +185,8 @@ pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<(
     match padded <= most && u64::from(width.max(height)) <= longest {
         true => Ok(()),
         false => Err(Error::Device(format!(
-            "an image of {width} x {height} is too large to filter on this device: choose at most {most} pixels, and \
-             {longest} along an edge"
+            "an image of {width} x {height} is too large to filter on this device: choose at most {most} pixels, with the \
+             width counted up to a multiple of 8, and {longest} along an edge"
         ))),
     }
 }

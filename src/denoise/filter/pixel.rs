@@ -11,10 +11,12 @@ pub fn known_radiance([r, g, b, count]: vec4) -> Option<Vec3> {
     known.then(|| colour.clamp(Vec3::splat(-LARGEST), Vec3::splat(LARGEST)))
 }
 
-/// Position that differences can be taken of; 0 where there is none.
+/// Position that differences can be taken of, without the lowest bit of x, which `glsl/shared/smoothing_cell.glsl` needs; 0 where there is
+/// none.
 pub fn known_position(position: vec3) -> Vec3 {
     let p = Vec3::from(position);
-    if p.is_finite() { p.clamp(Vec3::splat(-FARTHEST), Vec3::splat(FARTHEST)) } else { Vec3::ZERO }
+    let p = if p.is_finite() { p.clamp(Vec3::splat(-FARTHEST), Vec3::splat(FARTHEST)) } else { Vec3::ZERO };
+    Vec3 { x: f32::from_bits(p.x.to_bits() & !1), ..p }
 }
 
 /// Unit normal after its way through 32 bits; 0 where there is none.

@@ -274,4 +274,15 @@ fn positions_and_depths_are_made_of_each_other_and_it_is_said() {
     assert!(notes.contains("depth: made of the position"), "{notes}");
     let (guide, _) = guides(&|film| film.add_vec3("P", ["X", "Y", "Z"], &[[0.0, 1.0, 5.0]; 4]));
     assert!(guide.iter().all(|g| g.depth > 0.0), "all as deep: {guide:?}");
+    // No normals, and both sides of a wall: nothing tells where depth grows, but what is hit is a surface.
+    let sides = [1.0, -1.0, 1.0, -1.0].map(|z| [0.0, 0.0, z]);
+    for normals in [None, Some(sides)] {
+        let mut film = film();
+        normals.iter().for_each(|sides| film.add_vec3("N", ["X", "Y", "Z"], sides));
+        film.add_vec3("P", ["X", "Y", "Z"], &hits);
+        let guide = take_apart(&film, Demodulation::Light).input.guide;
+        assert_eq!([0, 1, 2, 3].map(|i| guide[i].depth), [1.0, 1.0, 1.0, 0.0]);
+        let aovs = Aovs::find(&film, &Names::new()).unwrap();
+        assert!(Layers::new(&aovs).notes.contains(&"depth: made of the position, the same for all".to_owned()));
+    }
 }
