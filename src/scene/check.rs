@@ -3,7 +3,7 @@
 use super::build::attributes::words_of;
 use super::build::bvh;
 use super::build::coat::reads_table;
-use super::{Environment, Scene};
+use super::{Environment, MAX_COORDINATE, Scene};
 use crate::error::{Checked, Error, Result};
 use crate::layout::{
     AliasEntry, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_LEAF, LightNode, Material, NONE, SPHERE, Shading,
@@ -220,7 +220,11 @@ fn fit(
 /// By how much the length of a camera's `forward` may differ from 1.
 const UNIT: f32 = 1e-3;
 
-/// Checks that rays can leave a camera: its numbers are finite, `forward` is a unit vector, its axes span space, and no length is negative.
+/// Least volume, of axes of length 1, of a camera's axes: below, they lie in one plane up to rounding.
+const LEAST_VOLUME: f64 = 1e-6;
+
+/// Checks that rays can leave a camera: its numbers are finite, lengths and coordinates at most 1e12, `forward` is a unit vector, its axes
+/// span space, and no length is negative.
 ///
 /// # Errors
 /// [`Error::Usage`].
@@ -231,7 +235,12 @@ pub fn check_camera(camera: &Camera) -> Result<()> {
     let needs = match camera {
         _ if !numbers.iter().all(|number| number.is_finite()) => "finite numbers alone",
         _ if (forward.length() - 1.0).abs() > f64::from(UNIT) => "a unit vector as forward",
-        _ if volume == 0.0 => "right, up and forward that lie in no plane",
+        _ if volume.abs() < LEAST_VOLUME => "right, up and forward that lie in no plane",
+        Camera { position: [x, y, z], lens_radius, near, focus_distance, .. }
+            if [x, y, z, lens_radius, near, focus_distance].iter().any(|v| v.abs() > MAX_COORDINATE as f32) =>
+        {
+            "coordinates and lengths of at most 1e12"
+        }
         Camera { lens_radius, near, .. } if lens_radius.min(*near) < 0.0 => "a lens_radius and near of at least 0",
         Camera { lens_radius, focus_distance, .. } if *lens_radius > 0.0 && *focus_distance <= 0.0 => {
             "a focus_distance above 0 to a lens"

@@ -386,6 +386,8 @@ fn poses_that_cannot_be_are_one_line_and_change_nothing() {
         (deform(mesh, far, Vec::new()), "the limit is 1e12"),
         (deform(0, still, Vec::new()), "mesh 0 cannot be deformed"),
         (Pose { meshes: vec![twice.clone(), twice], ..Pose::default() }, "mesh 4 is posed twice: keep one"),
+        (Pose { rebuild_above: f32::NAN, ..Pose::default() }, "rebuild_above is NaN"),
+        (Pose { rebuild_above: -1.0, ..Pose::default() }, "rebuild_above is -1"),
         (Pose { materials: vec![(7, Default::default())], ..Pose::default() }, "material 7 of"),
         (Pose { lights: vec![(0, Default::default())], ..Pose::default() }, "light 0: needs intensity"),
         (Pose { lights: vec![(1, Default::default())], ..Pose::default() }, "light 1 of 1: there is none"),

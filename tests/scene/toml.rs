@@ -526,3 +526,27 @@ fn rough_coats_share_a_table_by_index_and_distribution() {
     let nonlinear: Vec<_> = scene.materials[..4].iter().map(|m| m.flags & MATERIAL_NONLINEAR != 0).collect();
     assert_eq!(nonlinear, [false, true, false, false]);
 }
+
+/// What another key overrules, or nothing reads, is not dropped without a word.
+#[test]
+fn keys_that_change_nothing_are_told() {
+    let lamp = |rest: &str| parse(&format!("{BOX}[[light]]\n{rest}")).unwrap().scene.warnings;
+    let [position, direction] = ["position = [0, 0, 1]\n", "direction = [0, -1, 0]\n"];
+    let point = lamp(&format!("type = \"point\"\n{position}{direction}intensity = 1\ncutoff = 10\nirradiance = 1\n"));
+    assert_eq!(point, ["light 1: a point light does not read direction, irradiance, cutoff"]);
+    let sun = lamp(&format!("type = \"directional\"\n{position}{direction}irradiance = 1\nintensity = 1\ncone = 2\n"));
+    assert_eq!(sun, ["light 1: a directional light does not read position, intensity, cone"]);
+    let spot = lamp(&format!("type = \"spot\"\n{position}{direction}intensity = 1\ncutoff = 10\ncone = 2\n"));
+    assert_eq!(spot, Vec::<String>::new());
+    for (more, says) in [
+        (
+            "[environment]\nrotation = 9\nworld_from_environment = [1, 0, 0, 0, 1, 0, 0, 0, 1]\n",
+            "has both rotation and",
+        ),
+        ("[[material]]\nname = \"m\"\ntype = \"conductor\"\nmetal = \"Au\"\neta = 1\n", "has both metal and eta or k"),
+        ("[[mesh]]\nshape = \"cube\"\nsegments = 8\n", "has segments, which are for spheres and disks"),
+    ] {
+        let line = error(&format!("{BOX}{more}"));
+        assert!(line.contains(says), "{line}");
+    }
+}

@@ -23,6 +23,7 @@ pub fn add_lights(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
     for (i, table) in sources.description.light.iter().enumerate() {
         let light = table.build().map_err(|what| sources.at(format!("light {}", i + 1), what))?;
         scene.lights.push(light);
+        sources.library.warnings.extend(table.warning(i + 1));
     }
     let Some(table) = &sources.description.environment else { return Ok(()) };
     let at = |what| Error::input_at(sources.path, PLACE, what);
@@ -31,6 +32,9 @@ pub fn add_lights(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
     let radiance: [f32; 3] = std::array::from_fn(|c| scale[c] * constant[c]);
     if !radiance.iter().all(|v| (0.0..=MAX_RADIANCE).contains(v)) || !table.rotation.is_finite() {
         return Err(at(format!("radiance times scale must lie from 0 to {MAX_RADIANCE:e}, rotation be finite")));
+    }
+    if table.rotation != 0.0 && table.world_from_environment.is_some() {
+        return Err(at("has both rotation and world_from_environment: choose one".to_owned()));
     }
     let rotation = rotation(table.rotation, table.world_from_environment).map_err(at)?;
     let light = light(radiance, rotation);

@@ -1,7 +1,7 @@
 //! Reads what a description names: materials and files of meshes, with the warnings about them.
 use crate::error::{Error, Result};
 use crate::scene::description::mesh::Mesh;
-use crate::scene::description::{self, Description, MeshTable};
+use crate::scene::description::{self, Description, MeshTable, Shape};
 use crate::scene::load::library::Library;
 use crate::scene::load::mesh_file::{self, Format};
 use crate::scene::load::obj::ObjFile;
@@ -144,6 +144,9 @@ impl<'a> Sources<'a> {
             return Err(self.at(place(), "has a clip, which is for glTF files"));
         }
         mesh.data.as_ref().map_or(Ok(()), Mesh::check).map_err(|what| self.at(place(), what))?;
+        if mesh.segments.is_some() && !matches!(mesh.shape, Some(Shape::Sphere | Shape::Disk)) {
+            return Err(self.at(place(), "has segments, which are for spheres and disks"));
+        }
         match mesh.segments.filter(|n| !(3..=4096).contains(n)) {
             Some(n) => Err(self.at(place(), format!("segments is {n}: choose a value from 3 to 4096"))),
             None => Ok(()),

@@ -54,6 +54,11 @@ pub struct Camera {
 /// Position and orthonormal axes (right, up, forward).
 type Frame = (DVec3, [DVec3; 3]);
 
+/// Degrees: rays of a narrower view are one, up to rounding.
+const LEAST_FOV: f64 = 1e-6;
+/// World units.
+const LEAST_EDGE: f64 = 1e-12;
+
 impl Camera {
     /// The device's camera for a film of (width, height) pixels; without a position it looks at a scene of these bounds.
     ///
@@ -118,10 +123,12 @@ impl Camera {
         let fov = self.fov.unwrap_or(40.0);
         match self.orthographic {
             Some(_) if self.fov.is_some() => Err("has both fov and orthographic: choose one".into()),
-            Some(edge) if edge > 0.0 && edge <= MAX_COORDINATE => Ok(edge / 2.0),
-            Some(edge) => Err(format!("orthographic is {edge}: choose a length above 0 and up to {MAX_COORDINATE:e}")),
-            None if fov > 0.0 && fov < 180.0 => Ok((fov.to_radians() / 2.0).tan()),
-            None => Err(format!("fov is {fov}: choose degrees above 0 and below 180")),
+            Some(edge) if (LEAST_EDGE..=MAX_COORDINATE).contains(&edge) => Ok(edge / 2.0),
+            Some(edge) => {
+                Err(format!("orthographic is {edge:?}: choose a length from {LEAST_EDGE:e} to {MAX_COORDINATE:e}"))
+            }
+            None if (LEAST_FOV..180.0).contains(&fov) => Ok((fov.to_radians() / 2.0).tan()),
+            None => Err(format!("fov is {fov:?}: choose degrees from {LEAST_FOV:e}, below 180")),
         }
     }
 
@@ -291,7 +298,14 @@ mod tests {
     fn bad_cameras_are_named() {
         let build = |c: Camera| c.build([8, 8], [[0.0; 3], [1.0; 3]]);
         assert!(build(Camera::default()).is_ok());
-        assert!(build(Camera { fov: Some(180.0), ..Camera::default() }).unwrap_err().contains("fov"));
+        for fov in [180.0, 0.0, 1e-60, f64::NAN] {
+            assert!(build(Camera { fov: Some(fov), ..Camera::default() }).unwrap_err().contains("fov is"));
+        }
+        for edge in [0.0, 1e-60, 1e13] {
+            assert!(
+                build(Camera { orthographic: Some(edge), ..Camera::default() }).unwrap_err().contains("orthographic")
+            );
+        }
         assert!(build(Camera { near: f32::NAN, ..Camera::default() }).unwrap_err().contains("near"));
         let flat = Camera { world_from_camera: Some([0.0; 16]), ..Camera::default() };
         assert!(build(flat).unwrap_err().contains("world_from_camera"));

@@ -76,6 +76,28 @@ impl LightTable {
         }
     }
 
+    /// A warning about the keys of the table that its type does not read.
+    pub fn warning(&self, number: usize) -> Option<String> {
+        use Type::{Directional, Point, Spot};
+        let keys: [(&str, bool, &[Type]); 7] = [
+            ("position", self.position.is_some(), &[Point, Spot]),
+            ("direction", self.direction.is_some(), &[Spot, Directional]),
+            ("target", self.target.is_some(), &[Spot]),
+            ("intensity", self.intensity.is_some(), &[Point, Spot]),
+            ("irradiance", self.irradiance.is_some(), &[Directional]),
+            ("cone", self.cone.is_some(), &[Spot]),
+            ("cutoff", self.cutoff.is_some(), &[Spot]),
+        ];
+        let unread = keys.iter().filter(|(_, is_set, types)| *is_set && !types.contains(&self.kind));
+        let unread: Vec<_> = unread.map(|(name, ..)| *name).collect();
+        let kind = match self.kind {
+            Point => "point",
+            Spot => "spot",
+            Directional => "directional",
+        };
+        (!unread.is_empty()).then(|| format!("light {number}: a {kind} light does not read {}", unread.join(", ")))
+    }
+
     /// Unit direction in which the light travels.
     fn axis(&self, from: Vec3) -> Result<[f32; 3], String> {
         let direction = match (self.direction, self.target) {

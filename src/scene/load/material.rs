@@ -161,6 +161,9 @@ impl Materials {
             (m.eta, m.k) = ([0.0; 3], [1.0; 3]);
         }
         if t.kind == Type::Conductor {
+            if t.metal.is_some() && (t.eta.is_some() || t.k.is_some()) {
+                return Err("has both metal and eta or k: choose one".into());
+            }
             if let Some(name) = &t.metal {
                 (m.eta, m.k) = metal::metal(name)?;
             } else if t.eta.is_some() || t.k.is_some() {
