@@ -12,7 +12,7 @@ const GAP: usize = 4;
 /// percentile of the differences that are not 0, so that a few fireflies do not hide the rest. Larger values are clamped.
 ///
 /// # Panics
-/// When the sizes differ.
+/// When the sizes differ, or the pictures have no pixel.
 pub fn heat_map(test: &Picture, reference: &Picture) -> (Picture, f32) {
     let top = scale_top(&errors(test, reference));
     (heat_map_to(test, reference, top), top)
@@ -21,7 +21,7 @@ pub fn heat_map(test: &Picture, reference: &Picture) -> (Picture, f32) {
 /// As [`heat_map`] with a given top of the scale, for maps that are to be compared with each other.
 ///
 /// # Panics
-/// When the sizes differ.
+/// When the sizes differ, or the pictures have no pixel.
 pub fn heat_map_to(test: &Picture, reference: &Picture, top: f32) -> Picture {
     false_colours(test.width, &errors(test, reference), top)
 }

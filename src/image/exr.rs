@@ -25,6 +25,11 @@ const PREFIX: &str = "tallow:";
 type FlatPart = Layer<AnyChannels<FlatSamples>>;
 
 pub(super) fn encode(film: &Film, out: &mut dyn Stream) -> std::io::Result<()> {
+    let pixels = film.pixels();
+    if let Some(Channel { name, samples, .. }) = film.channels.iter().find(|c| c.samples.len() != pixels) {
+        let what = format!("channel {name} has {} samples for {pixels} pixels", samples.len());
+        return Err(std::io::Error::new(ErrorKind::InvalidData, what));
+    }
     fn channel(c: &Channel) -> AnyChannel<&Samples> {
         AnyChannel::new(text(&c.name), &c.samples)
     }

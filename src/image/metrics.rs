@@ -92,9 +92,9 @@ pub fn relative_squares(test: &Picture, reference: &Picture) -> Vec<f64> {
     test.pixels.iter().zip(&reference.pixels).map(pixel).collect()
 }
 
-/// Mean of the values without the largest ones, of which there are `share` times their number, rounded down.
+/// Mean of the values without the largest ones, of which there are `share` times their number, rounded down; 0 where none is left.
 pub fn trimmed_mean(mut values: Vec<f64>, share: f64) -> f64 {
-    let kept = values.len() - (share * values.len() as f64) as usize;
+    let kept = values.len().saturating_sub((share * values.len() as f64) as usize);
     if kept == 0 {
         return 0.0;
     }

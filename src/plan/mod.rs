@@ -192,7 +192,7 @@ fn out_of_reach(target: Target, forecasts: &[Forecast], most: u32) -> Error {
     Error::Usage(match target {
         Target::GpuMs(ms) => {
             format!(
-                "one sample a pixel takes {least:.3} ms here, {ms} ms were given: allow more, or choose a smaller film"
+                "one sample a pixel takes {least:.3} ms here, {ms:.3} ms were given: allow more, or choose a smaller film"
             )
         }
         Target::RelMse(error) if most < Settings::MAX_SPP => {

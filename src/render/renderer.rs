@@ -310,9 +310,11 @@ impl Renderer {
         &self.frame.scene
     }
 
-    /// That of the scene; none once the camera was moved, nor where what was accumulated is of something else.
+    /// That of the scene; none once the camera was moved, nor where what was accumulated is of something else, nor where the sequence may
+    /// begin again among the samples.
     pub(super) fn fingerprint(&self) -> Option<&Fingerprint> {
-        self.fingerprint.as_ref().filter(|_| !self.relabelled.load(Relaxed))
+        let ends = self.settings.first_sample.checked_add(Settings::MAX_SPP).is_some();
+        self.fingerprint.as_ref().filter(|_| ends && !self.relabelled.load(Relaxed))
     }
 
     /// What was asked for.

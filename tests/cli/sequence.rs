@@ -350,6 +350,7 @@ fn options_that_cannot_be_are_one_line() {
         ("--frames 0..3 -o f.exr", "choose a name as f.####.exr"),
         ("--frames 3..3", "no frame lies from 3 on and before 3"),
         ("--frames 0..3 --only 5", "none of the frames"),
+        ("--frames 0..4000000000", "4000000000 frames are more than 1000000"),
         ("--frames 0..3 -o n/p.%03d.exr", "choose a name as n/p.###.exr"),
         ("--frames 0..3 -o p.##.####.exr", "p.##.####.exr: has two places for the number of the frame"),
         ("--frames 0..3 --fps 0", "'0' for '--fps <FPS>': choose a number above 0"),

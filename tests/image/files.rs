@@ -438,3 +438,14 @@ mod replaced {
         assert_eq!(["a.exr", "a-2.exr", "a-3.exr"].map(|name| read(inside(name)).unwrap()), [b"1", b"2", b"3"]);
     }
 }
+
+/// Fields are public: a channel may have any length.
+#[test]
+fn a_channel_of_another_length_is_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = Film::new(2, 2);
+    film.add("R", Samples::F32(vec![1.0; 4]));
+    film.channels[0].samples = Samples::F32(vec![1.0]);
+    let line = image::write(&folder.path().join("a.exr"), &film, &WriteOptions::default()).unwrap_err().to_string();
+    assert!(line.contains("channel R has 1 samples for 4 pixels"), "{line}");
+}

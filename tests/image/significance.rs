@@ -57,6 +57,24 @@ fn options(false_alarms: f64) -> Options {
     Options { false_alarms, ..Options::default() }
 }
 
+#[test]
+fn what_is_no_image_is_refused() {
+    let mut random = fastrand::Rng::with_seed(1);
+    let good = image(4, 8, Light::Exponential, |_| 1.0, &mut random);
+    let says = |a: &Estimate, options: Options, word: &str| {
+        let line = test(a, &good, &options).unwrap_err();
+        assert!(line.contains(word), "{line}");
+    };
+    assert!(test(&good, &good, &Options::default()).is_ok(), "control");
+    let mut broken = good.clone();
+    broken.mean[3][1] = f32::NAN;
+    says(&broken, Options::default(), "image A: a value is no finite number");
+    says(&Estimate { mean: Vec::new(), ..good.clone() }, Options::default(), "16 pixels, but [0, 16, 16] means");
+    says(&Estimate { objects: Some(vec![1]), ..good.clone() }, Options::default(), "[16, 16, 1]");
+    says(&good, Options { accept: f64::INFINITY, ..Options::default() }, "both finite");
+    says(&good, Options { resolve: f64::NAN, ..Options::default() }, "both finite");
+}
+
 fn differs(outcome: &Outcome) -> bool {
     outcome.verdict == Verdict::Different
 }

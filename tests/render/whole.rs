@@ -52,6 +52,14 @@ fn the_sequence_of_samples_goes_on_from_its_start_behind_its_end() {
     let first = |step: Step| if let Step::Uniform(batch) = step { Some(batch.first_sample) } else { None };
     let firsts = [0, 1, 2].map(|sample| renderer.samples(sample, 1).find_map(first));
     assert_eq!(firsts, [Some(u32::MAX), Some(0), Some(1)]);
+    // Ranges of such samples cannot be told: its film names none, and says so to who would go on with it.
+    let film = |first: u32, renderer: &mut Renderer| {
+        renderer.set_first_sample(first);
+        let job = Job::new(renderer);
+        let status = job.run_to_end(&mut FrameResources::new(&support::gpu()).unwrap()).unwrap();
+        job.film(&status).unwrap().metadata.contains_key("sampleRanges")
+    };
+    assert_eq!([7, u32::MAX - 1].map(|first| film(first, &mut renderer)), [true, false]);
 }
 
 /// Its buffers are as long as those of layers that nobody asked for.

@@ -79,6 +79,9 @@ pub struct Args {
 
 type IsGiven = fn(&render::Args) -> bool;
 
+/// Most frames that one command renders.
+const MOST_FRAMES: usize = 1_000_000;
+
 /// Options for one image, which a sequence refuses, and whether they are given.
 const OF_ONE: [(&str, IsGiven); 6] = [
     ("resume", |args| args.resume.is_some()),
@@ -133,9 +136,12 @@ impl Args {
     fn numbers(&self, frames: &Range<u32>) -> Result<Range<u32>> {
         let only = self.only.as_ref().unwrap_or(frames);
         let numbers = only.start.max(frames.start)..only.end.min(frames.end);
-        match numbers.is_empty() {
-            true => Err(Error::Usage("none of the frames is in --frames and --only: 0..96 are 96 frames".to_owned())),
-            false => Ok(numbers),
+        match numbers.len() {
+            0 => Err(Error::Usage("none of the frames is in --frames and --only: 0..96 are 96 frames".to_owned())),
+            1..=MOST_FRAMES => Ok(numbers),
+            many => Err(Error::Usage(format!(
+                "{many} frames are more than {MOST_FRAMES}: choose some of them by --frames or --only"
+            ))),
         }
     }
 

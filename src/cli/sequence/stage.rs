@@ -2,7 +2,7 @@
 use super::chain::Chain;
 use super::preview::Preview;
 use super::survey::Survey;
-use super::{Args, FrameReport};
+use super::{Args, FrameReport, MOST_FRAMES};
 use crate::cli::Exit;
 use crate::cli::files::{Files, first_with_layers};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
@@ -276,16 +276,13 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Most frames that are rendered without being asked for.
-const MOST_FRAMES: f64 = 1e6;
-
 /// The frames up to the last key.
 fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
     let last = animation.last_frame(fps);
     if animation.end() == 0.0 {
         return Err(Error::Usage("how many frames there are is not known: nothing moves; give --frames 0..96".into()));
     }
-    if last > MOST_FRAMES {
+    if last >= MOST_FRAMES as f64 {
         return Err(Error::Usage(format!("{last} frames last to the end of what moves: choose some by --frames")));
     }
     Ok(0..last as u32 + 1)

@@ -32,6 +32,26 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// Checks that there is a value for every pixel, and that all are numbers.
+    ///
+    /// # Errors
+    /// What is missing.
+    pub fn check(&self) -> Result<(), String> {
+        let pixels = self.width as usize * self.height as usize;
+        let objects = self.objects.as_ref().map_or(pixels, Vec::len);
+        let (squares, counts) = match &self.noise {
+            Noise::Samples { m2, count } => (m2, &count[..]),
+            Noise::SquaredErrors(squares) => (squares, &[][..]),
+        };
+        let lengths = [self.mean.len(), squares.len(), objects];
+        let counted = counts.is_empty() || counts.len() == pixels;
+        if pixels == 0 || !counted || lengths.iter().any(|&length| length != pixels) {
+            return Err(format!("{pixels} pixels, but {lengths:?} means, noises and objects"));
+        }
+        let mut numbers = self.mean.iter().chain(squares).flatten().chain(counts);
+        if numbers.all(|v| v.is_finite()) { Ok(()) } else { Err("a value is no finite number".to_owned()) }
+    }
+
     /// Takes the means, the noise and the objects of a film. Of a filtered film the noisy image is taken.
     ///
     /// # Errors

@@ -217,11 +217,15 @@ fn check(a: &Estimate, b: &Estimate, options: &Options) -> Result<(), String> {
             a.width, a.height, b.width, b.height
         ));
     }
+    for (name, image) in [("A", a), ("B", b)] {
+        image.check().map_err(|what| format!("image {name}: {what}"))?;
+    }
     if !(options.false_alarms > 0.0 && options.false_alarms <= 0.3) {
         return Err(format!("false alarms of {}: choose a rate above 0, up to 0.3", options.false_alarms));
     }
-    match options.resolve > 0.0 && options.accept >= 0.0 {
+    let are_finite = options.resolve.is_finite() && options.accept.is_finite();
+    match are_finite && options.resolve > 0.0 && options.accept >= 0.0 {
         true => Ok(()),
-        false => Err("the difference to resolve must be above 0, and the accepted one at least 0".to_owned()),
+        false => Err("the difference to resolve must be above 0, the accepted one at least 0, both finite".to_owned()),
     }
 }

@@ -101,10 +101,14 @@ impl Viewer<'_> {
         (shots, missing.into_iter().map(|index| self.images[index].name.as_str()).collect())
     }
 
-    /// `None` for an image without pixels, or of more than `left` characters. What is too long is not encoded as far as its length
+    /// `None` for an image without pixels, or of another number than its size says, or of more than `left` characters. What is too long is not encoded as far as its length
     /// is known before.
     fn shot(&self, index: usize, left: usize) -> Option<Shot<'_>> {
         let image = &self.images[index];
+        let Picture { width, height, pixels } = image.picture;
+        if pixels.len() != *width as usize * *height as usize {
+            return None;
+        }
         let crop = pixels::middle(image.picture, LARGEST);
         let left = left.checked_sub(pixels::length_of_halves(&crop.picture))?;
         let png = pixels::png(&crop.picture).ok().filter(|png| png.len() <= left)?;
@@ -117,6 +121,14 @@ impl Viewer<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_picture_of_another_size_than_it_says_is_left_out() {
+        let broken = Picture { width: 16, height: 16, pixels: vec![[0.5; 3]; 5] };
+        let image = Image { name: "a".into(), caption: String::new(), picture: &broken, rank: 0 };
+        let html = Viewer { group: "g".into(), images: vec![image], reference: None }.html();
+        assert!(names(&html).is_empty() && html.contains("left out: a"), "{html}");
+    }
 
     fn names(html: &str) -> Vec<&str> {
         html.split("data-name=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect()
