@@ -111,6 +111,30 @@ fn what_is_flat_at_rest_may_grow() {
     scene.check().unwrap();
 }
 
+/// No instance is as flat as a plane: its vertices are placed in each pose. So it is seen where its parent takes it, and has its extent back
+/// when it grows.
+#[test]
+fn what_is_flattened_along_an_axis_moves() {
+    let mut json = triangle();
+    json["nodes"][0]["scale"] = json!([2, 0, 1]);
+    let mesh = json["nodes"].as_array().unwrap().len();
+    push(&mut json, "nodes", json!({ "children": [0] }));
+    json["scenes"][0]["nodes"] = json!([mesh, 1]);
+    animate(&mut json, mesh, "translation", &[0.0, 0.0, 0.0, 0.0, 0.0, 4.0], "VEC3");
+    animate(&mut json, 0, "scale", &[2.0, 0.0, 1.0, 2.0, 3.0, 1.0], "VEC3");
+    let loaded = load(&json);
+    assert_eq!(loaded.warnings, Vec::<String>::new());
+    assert_eq!(corners(&loaded, 0.0), [[0.0; 3], [2.0, 0.0, 0.0], [0.0; 3]]);
+    assert_eq!(corners(&loaded, 2.0), [[0.0, 0.0, 4.0], [2.0, 0.0, 4.0], [0.0, 3.0, 4.0]]);
+    // Weights of a mesh on a flattened node.
+    let mut json = triangle();
+    json["nodes"][0]["scale"] = json!([2, 1, 0]);
+    json["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": 0 }]);
+    animate(&mut json, 0, "weights", &[0.0, 1.0], "SCALAR");
+    let loaded = load(&json);
+    assert_eq!([0.0, 1.0].map(|at| corners(&loaded, at)[1]), [[2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
+}
+
 #[test]
 fn joints_and_weights_move_vertices() {
     let mut json = triangle();

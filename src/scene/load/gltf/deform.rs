@@ -4,7 +4,7 @@ use super::asset::Asset;
 use super::primitive::{Influence, Primitive, Target};
 use crate::error::Result;
 use crate::scene::description::Mesh;
-use glam::{DAffine3, DMat4, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
 
 /// A skin: its joints, and where they were when it was bound to them.
 #[derive(Debug)]
@@ -39,6 +39,11 @@ impl Skin {
             true => Ok(Self { joints, inverse_binds }),
             false => Err(asset.at(place, "has an inverse bind matrix with NaN or infinite numbers")),
         }
+    }
+
+    /// Of one joint, the node that shows the mesh, which is at `own` seen from there.
+    pub fn of_node(node: usize, own: DAffine3) -> Self {
+        Self { joints: vec![node], inverse_binds: vec![own] }
     }
 
     /// By joint: what it does to vertices, where `worlds` are the transforms of all nodes.
@@ -102,11 +107,13 @@ fn blended(primitive: &Primitive, vertex: usize, matrices: &[DAffine3]) -> DAffi
     }
 }
 
-/// Normals are turned by the inverse transpose; where joints flatten the surface there is none, and they are turned as vectors.
+/// Normals are turned by the cofactors, which are the inverse transpose times the determinant, and tell the normal of the plane where joints
+/// flatten the surface.
 fn turned_normal(matrix: &DAffine3, normal: DVec3) -> DVec3 {
-    let inverse = matrix.matrix3.inverse();
-    let turned = if inverse.is_finite() { inverse.transpose() * normal } else { matrix.matrix3 * normal };
-    turned.normalize_or(normal)
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = matrix.matrix3;
+    let turned = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * normal;
+    let outward = if matrix.matrix3.determinant() < 0.0 { -turned } else { turned };
+    outward.normalize_or(normal)
 }
 
 fn double(v: [f32; 3]) -> DVec3 {
@@ -134,5 +141,11 @@ mod tests {
             assert_eq!((moved.indices.as_slice(), moved.tangents[0]), (&indices[..], tangent), "scaled by {x}");
             assert_eq!(moved.normals[0], [0.0, 0.0, 1.0], "which the triangle faces");
         }
+        // A matrix of shear, beside the inverse transpose; and one that flattens along z, where all of it faces along z.
+        let sheared = DAffine3::from_cols_array(&[1.0, 0.2, 0.0, 0.5, -2.0, 0.1, 0.3, 0.0, 3.0, 0.0, 0.0, 0.0]);
+        let normal = DVec3::new(0.48, 0.6, 0.64);
+        let expected = (sheared.matrix3.inverse().transpose() * normal).normalize();
+        assert!((turned_normal(&sheared, normal) - expected).length() < 1e-12);
+        assert_eq!(turned_normal(&DAffine3::from_scale(DVec3::new(2.0, 1.0, 0.0)), normal), DVec3::Z);
     }
 }

@@ -125,16 +125,30 @@ impl<'a> Placer<'a> {
             skin.is_some() && !primitive.joints.is_empty() || weighted && !primitive.targets.is_empty()
         };
         let flat = self.flat;
-        let copies = self.copies(node)?;
+        let (flattened, copies): (Vec<Copy>, Vec<Copy>) =
+            self.copies(node)?.into_iter().partition(|copy| self.moves_flattened(copy));
         if skin.is_some() && self.meshes[&mesh].iter().all(|primitive| !primitive.joints.is_empty()) {
             self.flat = flat; // joints alone say where it is
         }
-        if !self.meshes[&mesh].iter().any(bends) {
+        let bends = self.meshes[&mesh].iter().any(bends);
+        let name = json.name.as_ref().or(self.asset.root.meshes[mesh].name.as_ref());
+        let name = name.map_or_else(|| format!("node {node}"), |name| one_line(name));
+        for primitive in self.meshes[&mesh].clone() {
+            if flattened.is_empty() || skin.is_some() && !primitive.joints.is_empty() {
+                continue;
+            }
+            let primitive = Arc::new(primitive.of_one_joint());
+            for Copy { node, own } in &flattened {
+                let skin = Some(Arc::new(Skin::of_node(*node, *own)));
+                let (number, weights) = (self.tables.len(), weights.cloned().unwrap_or_default());
+                let bent = MovedMesh { number, node: *node, primitive: primitive.clone(), skin, weights };
+                self.add_bent(&name, bent, &[])?;
+            }
+        }
+        if !bends {
             self.placed.entry(mesh).or_default().extend(copies);
             return Ok(());
         }
-        let name = json.name.as_ref().or(self.asset.root.meshes[mesh].name.as_ref());
-        let name = name.map_or_else(|| format!("node {node}"), |name| one_line(name));
         for primitive in self.meshes[&mesh].clone() {
             let skin = skin.clone().filter(|_| !primitive.joints.is_empty());
             let weights = weights.cloned().unwrap_or_default();
@@ -240,11 +254,17 @@ impl<'a> Placer<'a> {
         let mut copies: Vec<_> = owns.into_iter().map(|own| Copy { node, own }).collect();
         copies.retain(|copy| {
             let world = Transform::from(self.world(copy));
-            // What moves may be flat at rest alone; vertices that move are not baked.
-            self.moved.nodes[node] || world.has_inverse() || !self.moved.weights[node] && spans_a_plane(&world.0)
+            // What moves may be flat at rest alone.
+            self.moved.nodes[node] || world.has_inverse() || spans_a_plane(&world.0)
         });
         self.flat += usize::from(copies.is_empty());
         Ok(copies)
+    }
+
+    /// Whether it is flattened along one axis, and no fixed mesh can show it: no instance has such a transform.
+    fn moves_flattened(&self, copy: &Copy) -> bool {
+        let (world, moved) = (Transform::from(self.world(copy)), &self.moved);
+        (moved.nodes[copy.node] || moved.weights[copy.node]) && !world.has_inverse() && spans_a_plane(&world.0)
     }
 
     fn world(&self, copy: &Copy) -> DAffine3 {

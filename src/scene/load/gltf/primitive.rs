@@ -22,6 +22,16 @@ pub struct Primitive {
     pub joints: Vec<Influence>,
 }
 
+impl Primitive {
+    /// The same, all of it moved by the first joint.
+    pub fn of_one_joint(&self) -> Self {
+        let vertices = self.mesh.positions.len();
+        let joints = Influence { joints: vec![[0.0; 4]; vertices], weights: vec![[1.0, 0.0, 0.0, 0.0]; vertices] };
+        let (mesh, targets) = (self.mesh.clone(), self.targets.clone());
+        Self { mesh, material: self.material, targets, joints: vec![joints] }
+    }
+}
+
 /// Four of the joints that move each vertex.
 #[derive(Debug)]
 pub struct Influence {
@@ -32,7 +42,7 @@ pub struct Influence {
 }
 
 /// What a morph target of weight 1 adds to each vertex; an empty list adds nothing.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Target {
     /// Added to positions.
     pub positions: Vec<[f32; 3]>,
