@@ -72,7 +72,9 @@ fn what_is_no_image_is_refused() {
     says(&Estimate { mean: Vec::new(), ..good.clone() }, Options::default(), "16 pixels, but [0, 16, 16] means");
     says(&Estimate { objects: Some(vec![1]), ..good.clone() }, Options::default(), "[16, 16, 1]");
     says(&good, Options { accept: f64::INFINITY, ..Options::default() }, "both finite");
-    says(&good, Options { resolve: f64::NAN, ..Options::default() }, "both finite");
+    for resolve in [f64::NAN, 0.0, 1e-300] {
+        says(&good, Options { resolve, ..Options::default() }, "must be at least 1e-12");
+    }
 }
 
 fn differs(outcome: &Outcome) -> bool {

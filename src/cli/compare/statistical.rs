@@ -24,7 +24,7 @@ pub struct Args {
     false_alarms: f64,
     /// Relative difference, beyond the accepted one, that must be visible, or else the images are too noisy to say
     #[arg(long, value_name = "SHARE", default_value_t = Options::default().resolve, requires = "statistical",
-        value_parser = within((Excluded(0.0), Unbounded), "a number above 0"))]
+        value_parser = within(Options::LEAST.., "a number of at least 1e-12"))]
     resolve: f64,
     /// Where it must be visible: pixel, 4x4, 16x16, 64x64, 256x256, 1024x1024, object or image
     #[arg(long, value_name = "SCALE", default_value_t = Options::default().at, requires = "statistical")]

@@ -49,7 +49,7 @@ pub fn verdict(report: &Report) -> String {
             )
         }
         Verdict::Different => format!("different: {}", different(&report.outcome)),
-        Verdict::TooNoisy { visible, .. } if !visible.is_finite() => {
+        Verdict::TooNoisy { samples, .. } if !samples.is_finite() => {
             format!("too noisy to say: no difference is found, but in {place} B is black, to which nothing is relative")
         }
         Verdict::TooNoisy { visible, samples } => format!(

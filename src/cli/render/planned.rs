@@ -55,7 +55,8 @@ pub fn read(args: &Args) -> Result<Option<Plan>> {
 /// # Errors
 /// [`Error::Usage`] for options that ask for something else, and for a plan of another scene.
 pub fn settings(args: &Args, plan: &Plan, scene: &Scene) -> Result<Settings> {
-    plan.check_scene(scene)?;
+    let file = args.plan.as_deref().unwrap_or(Path::new("--plan")).display();
+    plan.check_scene(scene).map_err(|e| Error::Usage(format!("{file}: {e}")))?;
     let mut settings = plan.settings.clone();
     args.overrides.apply(&mut settings);
     let other = settings != plan.settings || args.denoise.is_some();

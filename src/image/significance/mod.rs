@@ -67,7 +67,7 @@ pub struct Options {
     /// [`Options::ROUNDING`], the last bits of drivers may count.
     pub accept: f64,
     /// Relative difference, beyond the accepted one, that must be visible, or else the images are too noisy to be called the
-    /// same.
+    /// same: [`Options::LEAST`] or more.
     pub resolve: f64,
     /// The scale at which it must be visible.
     pub at: Scale,
@@ -76,6 +76,9 @@ pub struct Options {
 impl Options {
     /// Relative difference that rounding makes: drivers differ in the last bits, and so do sums of many samples.
     pub const ROUNDING: f64 = 1e-5;
+
+    /// The smallest difference that may be asked for.
+    pub const LEAST: f64 = 1e-12;
 }
 
 impl Default for Options {
@@ -224,8 +227,11 @@ fn check(a: &Estimate, b: &Estimate, options: &Options) -> Result<(), String> {
         return Err(format!("false alarms of {}: choose a rate above 0, up to 0.3", options.false_alarms));
     }
     let are_finite = options.resolve.is_finite() && options.accept.is_finite();
-    match are_finite && options.resolve > 0.0 && options.accept >= 0.0 {
+    match are_finite && options.resolve >= Options::LEAST && options.accept >= 0.0 {
         true => Ok(()),
-        false => Err("the difference to resolve must be above 0, the accepted one at least 0, both finite".to_owned()),
+        false => {
+            let least = Options::LEAST;
+            Err(format!("the difference to resolve must be at least {least:e}, the accepted one 0, both finite"))
+        }
     }
 }

@@ -140,6 +140,9 @@ impl<'a> Sources<'a> {
             1 => {}
             _ => return Err(self.at(place(), "has more than one of a file, a shape and data in memory: choose one")),
         }
+        if mesh.file.as_ref().is_some_and(|file| file.as_os_str().is_empty()) {
+            return Err(self.at(place(), "its file has an empty name"));
+        }
         if mesh.clip.is_some() {
             return Err(self.at(place(), "has a clip, which is for glTF files"));
         }
