@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::image::significance::{self, Options, Scale, Verdict};
 use crate::image::{self, output};
 use serde_json::{Value, json};
-use std::ops::Bound::{Excluded, Included, Unbounded};
+use std::ops::Bound::{Excluded, Included};
 use std::path::{Path, PathBuf};
 
 /// Options of the test.

@@ -66,7 +66,7 @@ impl Next {
         if !scene.rig.is_built() && !pose.is_of_camera_alone() {
             return Err("the scene was neither loaded nor built from a description: only its camera can move".into());
         }
-        if !(pose.rebuild_above >= 0.0) {
+        if pose.rebuild_above.is_nan() || pose.rebuild_above < 0.0 {
             return Err(format!("rebuild_above is {}: 0 builds always, infinity never", pose.rebuild_above));
         }
         each_once(pose.meshes.iter().map(|(mesh, _)| *mesh))?;
