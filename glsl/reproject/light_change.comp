@@ -10,10 +10,11 @@ layout(scalar, binding = 1) writeonly buffer Sums { LightChange sums[]; };
 layout(scalar, push_constant) uniform Push { LightChangePush push; };
 
 // Both paths of a probe have the same random numbers, so that they differ only where light has changed. In windows of 3x3 cells
-// differences count by their size, since a narrow shadow that moves on takes as much light as it gives back. There a
-// single path would stand for a ninth of the light: the squared sum loses what each path alone has. Among 81 and 729 paths one counts as
-// it is, with its sign: it stands for little, and noise cancels.
-const uint LEAST_SPACING = 1u;
+// differences count by their size, since a narrow shadow that moves on takes as much light as it gives back; in larger ones with their
+// sign, so that noise cancels. The squared sum loses what each path alone has: the rest is without bias the square of what is expected, and
+// one bright path among 81, which tells of its own noise alone, is no change. Among 729 one counts as it is: it stands for little, and of
+// light that few paths meet no others tell.
+const uint LEAST_SPACING = 1u, WIDEST_SPACING = 9u;
 
 // A change without noise at one path (`change` of the first level) counts in a square of so many cells across around it, since few of
 // their paths meet the narrow edge of a shadow that passes there.
@@ -40,9 +41,9 @@ void main() {
         if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, size))) continue;
         certain = max(certain, LightChange_change(found, uint(q.y * size.x + q.x)));
     }
-    vec3 sum = abs(all.sum);
-    float together = sqrt(max(all.size * all.size - all.squares, 0.0));
-    float change = push.spacing == LEAST_SPACING ? together : largest_channel(sum);
+    float total = push.spacing == LEAST_SPACING ? all.size : largest_channel(abs(all.sum));
+    float own = push.spacing == WIDEST_SPACING ? 0.0 : all.squares;
+    float change = sqrt(max(total * total - own, 0.0));
     float before = push.spacing == LEAST_SPACING ? certain : LightChange_change(found, i);
     all.change = max(before, change > 0.0 ? change / all.light : 0.0);
     sums[i] = all;

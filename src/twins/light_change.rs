@@ -2,7 +2,7 @@
 use crate::layout::{Camera, History, LightChange, NONE, Probe, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::render::Carried;
-use crate::shaders::light_change::{CERTAIN_ACROSS, LEAST_SPACING};
+use crate::shaders::light_change::{CERTAIN_ACROSS, LEAST_SPACING, WIDEST_SPACING};
 use crate::shaders::shared::probe_cell::PROBE_CELL;
 use crate::twins::path::Tracer;
 use glam::Vec3;
@@ -135,9 +135,11 @@ pub fn sums(found: &[LightChange], cells: [u32; 2], spacing: u32) -> Vec<LightCh
             all.count += other.count;
         }
         let size = match spacing {
-            LEAST_SPACING => (all.size * all.size - all.squares).max(0.0).sqrt(),
+            LEAST_SPACING => all.size,
             _ => Vec3::from(all.sum).abs().max_element(),
         };
+        let own = if spacing == WIDEST_SPACING { 0.0 } else { all.squares };
+        let size = (size * size - own).max(0.0).sqrt();
         let change = if size > 0.0 { size / all.light } else { 0.0 };
         let before = match spacing {
             LEAST_SPACING => inside(CERTAIN_ACROSS, 1).map(|other| other.change).fold(0.0, f32::max),

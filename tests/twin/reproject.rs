@@ -235,9 +235,17 @@ fn changes_of_light_are_shares_of_it() {
     // What a narrow shadow takes and gives back is twice a change. Eight: 64 - 8.
     let moved = [1.0, -1.0, 1.0, -1.0, 0.0, 1.0, -1.0, 1.0, -1.0].map(change);
     assert!((found(&moved, 1) - f32::sqrt(56.0) / 18.0).abs() < 1e-6);
-    // In wider windows one path counts. Cells that are no multiple of three away belong to the sums of others.
+    // In wider windows changes count with their sign, and in the widest one path alone. Cells that are no multiple of the spacing away
+    // belong to the sums of others.
     let alone = |at: usize| (0..9).map(|i| change(f32::from(u8::from(i == at)))).collect::<Vec<_>>();
-    assert_eq!([found(&alone(4), 3), found(&alone(5), 3), found(&alone(4), 9)], [0.5, 0.0, 0.5]);
+    assert_eq!([found(&alone(4), 3), found(&alone(5), 9), found(&alone(4), 9)], [0.0, 0.0, 0.5]);
+    let wide = |corners: [f32; 2]| {
+        let mut some = vec![change(0.0); 49];
+        (some[24], some[3 * 7]) = (change(corners[0]), change(corners[1])); // three apart
+        light_change::sums(&some, [7, 7], 3)[24].change
+    };
+    let of_all = 2.0 * 9.0; // the light of nine cells
+    assert!((wide([1.0, 1.0]) - f32::sqrt(2.0) / of_all).abs() < 1e-6 && wide([1.0, -1.0]) == 0.0);
     // What has changed without noise counts by itself, two cells away, and in wider windows where it was found.
     let sums = |at: usize, spacing| {
         let certain = |i: usize| LightChange {
