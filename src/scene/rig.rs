@@ -38,6 +38,8 @@ pub struct Rig {
     pub(in crate::scene) light_numbers: Vec<u64>,
     /// Mean luminance of the environment's image, or 1.
     pub(in crate::scene) sky: f64,
+    /// Share of its light that its small bright parts have beyond what is around them.
+    pub(in crate::scene) sky_peaks: f64,
     /// [`Material::emission_weight`] is counted in 2 to the power of minus this.
     pub(in crate::scene) dimness: i32,
     /// Mean colours of pictures that emit or mask, by `texture::mean_key`.

@@ -2,7 +2,7 @@
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::Path;
-use tallow::image::{Film, WriteOptions, write};
+use tallow::image::{Film, Picture, WriteOptions, write};
 use tallow::layout::*;
 use tallow::scene::{Loaded, Scene, effects};
 use tallow::twins::texture::texture_sample;
@@ -200,6 +200,34 @@ fn neither_lamps_nor_lights_at_infinity_are_chosen_by_hardly_any_sample() {
     for l in wide.lights.iter().filter(|l| l.kind == LIGHT_TRIANGLE) {
         let density = wide.materials[l.material as usize].emission_weight * wide.triangle_pdf_scale;
         assert!((l.probability / area(l) / density - 1.0).abs() < 2e-5);
+    }
+}
+
+/// A sun in a picture is found by light sampling alone, as a directional light is: what it has above 16 times the mean counts eight times. A
+/// texel of row y of h takes a share (cos(pi y / h) - cos(pi (y + 1) / h)) / (2 w) of the sphere.
+#[test]
+fn a_sun_in_a_sky_s_picture_is_chosen_as_often_as_one_beside_it() {
+    use std::f64::consts::PI;
+    let folder = tempfile::tempdir().unwrap();
+    let chances = |sun: f64| {
+        let mut pixels = vec![[1.0; 3]; 64 * 32];
+        pixels[10 * 64 + 5] = [sun as f32; 3];
+        let film = Film::from(&Picture { width: 64, height: 32, pixels });
+        write(&folder.path().join("sky.exr"), &film, &WriteOptions::default()).unwrap();
+        let text = "[camera]\nposition = [0, 0, 5]\n[[mesh]]\nshape = \"rectangle\"\n[environment]\nfile = \"sky.exr\"\n\
+                    [[light]]\ntype = \"directional\"\ndirection = [0, 0, -1]\nirradiance = 1\n";
+        let scene = Scene::parse(&folder.path().join("scene.toml"), text).unwrap();
+        let [sun, sky] = [LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT]
+            .map(|kind| f64::from(scene.lights.iter().find(|l| l.kind == kind).unwrap().probability));
+        sky / sun
+    };
+    let texel = ((PI * 10.0 / 32.0).cos() - (PI * 11.0 / 32.0).cos()) / 128.0;
+    for sun in [10.0, 1000.0, 30000.0] {
+        let mean = 1.0 + texel * (sun - 1.0);
+        let peaks = texel * (sun - 16.0 * mean).max(0.0) / mean;
+        let expected = 4.0 * PI * mean * (1.0 + 7.0 * peaks) / 8.0;
+        let found = chances(sun);
+        assert!((found / expected - 1.0).abs() < 1e-3, "{sun}: {found}, expected {expected}");
     }
 }
 

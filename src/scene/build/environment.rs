@@ -139,10 +139,20 @@ fn with_table(width: u32, height: u32, mut texels: Vec<[f32; 4]>) -> Option<Envi
 
 /// Mean luminance over the sphere.
 pub fn mean_luminance(e: &Environment) -> f64 {
+    mean(e, |luminance| luminance)
+}
+
+/// Share of the light that is what the luminance has above `level`.
+pub fn share_above(e: &Environment, level: f64) -> f64 {
+    mean(e, |luminance| (luminance - level).max(0.0)) / mean_luminance(e)
+}
+
+/// Mean over the sphere of a function of the luminance.
+fn mean(e: &Environment, of: impl Fn(f64) -> f64) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for (y, row) in e.texels.chunks(e.width as usize).enumerate() {
         let sine = row_sine(y as u32, e.height);
-        sum += sine * row.iter().map(|t| f64::from(luminance([t[0], t[1], t[2]]))).sum::<f64>();
+        sum += sine * row.iter().map(|t| of(f64::from(luminance([t[0], t[1], t[2]])))).sum::<f64>();
         weight += sine * row.len() as f64;
     }
     sum / weight

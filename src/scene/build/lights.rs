@@ -1,12 +1,12 @@
 //! The list of lights, the table that chooses one in proportion to its power, and where there are many a tree over them. The table takes
-//! delta lights [`DELTA_WEIGHT`] times as often, those at infinity and the others at least [`LEAST_SHARE`] of the time each, the others
+//! delta lights and the small bright parts of a sky's picture [`DELTA_WEIGHT`] times as often, those at infinity and the others at least [`LEAST_SHARE`] of the time each, the others
 //! beside a sky without suns at least [`LEAST_BESIDE_SKY`]. Beside suns alone, a sky of one colour is not chosen.
 //!
 //! Power, by luminance, in watts up to a common factor: emissive triangle or sphere `pi * area * L` (L the mean over its texture
 //! times the mean opacity, twice that where both sides shine), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
 //! `pi R^2 E`, environment `4 pi^2 R^2` times its mean, R the radius of the scene.
 use super::brightness::brightness;
-use super::environment::mean_luminance;
+use super::environment::{mean_luminance, share_above};
 use super::light_tree::{self, Lamp};
 use super::{alias, bvh, geometry};
 use crate::error::Result;
@@ -30,6 +30,7 @@ use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 pub fn finish(scene: &mut Scene) -> Result<()> {
     scene.rig.lights = std::mem::take(&mut scene.lights);
     scene.rig.sky = scene.environment.as_ref().map_or(1.0, mean_luminance);
+    scene.rig.sky_peaks = scene.environment.as_ref().map_or(0.0, |sky| share_above(sky, PEAK * scene.rig.sky));
     weigh(scene);
     choose_unit(scene);
     list(scene)?;
@@ -106,7 +107,7 @@ pub fn list(scene: &mut Scene) -> Result<()> {
     let mut numbers: Vec<u64> = (0..lights.len() as u64).collect();
     add_triangles(scene, &mut lights, &mut numbers)?;
     drop_copies(scene.rig.lights.len(), &mut lights, &mut numbers);
-    let mut powers: Vec<f64> = lights.iter().map(|l| weight(l) * power(scene, l)).collect();
+    let mut powers: Vec<f64> = lights.iter().map(|l| weight(scene, l) * power(scene, l)).collect();
     let shines: Vec<bool> = powers.iter().map(|&p| p > 0.0).collect();
     keep(&mut lights, &shines);
     keep(&mut numbers, &shines);
@@ -301,8 +302,15 @@ const MOST_BY_POWER: usize = 3;
 /// .0120 and .0112; Crytek Sponza at 4 samples behaves alike. More would starve lamps beside a strong sun.
 const DELTA_WEIGHT: f64 = 8.0;
 
-fn weight(light: &Light) -> f64 {
-    if light.is_delta() { DELTA_WEIGHT } else { 1.0 }
+/// Luminance over the mean of a sky's picture above which its light counts as a delta light's: a sun in it is as hard to find by BSDF sampling.
+const PEAK: f64 = 16.0;
+
+fn weight(scene: &Scene, light: &Light) -> f64 {
+    match light.kind {
+        LIGHT_ENVIRONMENT => 1.0 + (DELTA_WEIGHT - 1.0) * scene.rig.sky_peaks,
+        _ if light.is_delta() => DELTA_WEIGHT,
+        _ => 1.0,
+    }
 }
 
 /// Leaves a sky of one colour to BSDF sampling where suns alone shine beside it. A path that leaves the scene finds such a sky as well as
