@@ -24,6 +24,9 @@ impl Denoiser {
     /// seen, give that of what is. `sigma_rt` is in units of `intensity`: give the radiance of what is white in your frames.
     /// [`Filtered`](super::Filtered) finds both by itself, but waits for the device.
     ///
+    /// Of few samples, leave `fireflies` at [`Fireflies::Usual`], as the command line does: one pixel that a single bright path has brought
+    /// may have more error than all others together.
+    ///
     /// Where the renderer's policy may leave pixels without a sample, these take direct light from the others, which the filter
     /// runs for once more.
     ///
@@ -36,6 +39,7 @@ impl Denoiser {
         row: &Row,
         settings: &FilterSettings,
         demodulation: Demodulation,
+        fireflies: Fireflies,
     ) -> Result<Self> {
         settings.validate()?;
         gpu.owns("the renderer", &renderer.gpu)?;
@@ -57,7 +61,7 @@ impl Denoiser {
             let what = "a frame with an indirect_stride needs samples in every pixel: set min_spp to 1 or more";
             return Err(Error::Usage(what.to_owned()));
         }
-        let parts = Demodulated::new(gpu, &noisy, demodulation, row.weighs_noise, in_paint, Fireflies::Off)?;
+        let parts = Demodulated::new(gpu, &noisy, demodulation, row.weighs_noise, in_paint, fireflies)?;
         Ok(Self { filter: row.compile(gpu, settings, parts.planes.size)?, parts, noisy })
     }
 

@@ -2,6 +2,7 @@
 use super::ceilings::{self, Ceilings};
 use super::frames::{Frames, Workload};
 use super::work::FrameWork;
+use crate::denoise::Recipe;
 use crate::denoise::filter::{FilterSettings, Row};
 use crate::denoise::{Denoiser, Noisy};
 use crate::error::Result;
@@ -32,9 +33,10 @@ pub struct Measured {
 ///
 /// # Errors
 /// As [`Denoiser::new`] and [`Job::run`].
-pub fn denoiser(gpu: &Gpu, renderer: &Renderer, row: &Row) -> Result<Denoiser> {
+pub fn denoiser(gpu: &Gpu, renderer: &Renderer, row: &'static Row) -> Result<Denoiser> {
     let demodulation = Noisy::of_film(renderer)?.holds().usual_demodulation();
-    let make = |settings: &FilterSettings| Denoiser::new(gpu, renderer, row, settings, demodulation);
+    let fireflies = Recipe::new(row.into()).fireflies();
+    let make = |settings: &FilterSettings| Denoiser::new(gpu, renderer, row, settings, demodulation, fireflies);
     let (first, mut frame) = (make(&FilterSettings::default())?, FrameResources::new(gpu)?);
     Job::new(renderer).run_to_end(&mut frame)?;
     gpu.run(&mut frame, |rec| first.record(rec))?;
@@ -52,7 +54,7 @@ pub fn measure(
     gpu: &Gpu,
     scene: &Scene,
     settings: &Settings,
-    filter: Option<&Row>,
+    filter: Option<&'static Row>,
     count: usize,
     done: &mut dyn FnMut(),
 ) -> Result<Measured> {

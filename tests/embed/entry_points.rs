@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::sync::mpsc;
 use std::time::Duration;
-use tallow::denoise::filter::{self, FilterSettings};
+use tallow::denoise::filter::{self, FilterSettings, firefly::Fireflies};
 use tallow::denoise::{Demodulation, Denoiser};
 use tallow::error::Error;
 use tallow::gpu::{Buffer, FrameResources, Gpu, RawDevice, Recorder};
@@ -39,7 +39,7 @@ fn nothing_is_created_after_the_first_frame() {
     let outputs = Outputs { split_light: true, guides: true, counters: true };
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
     let (row, settings) = (filter::find("auto").unwrap(), FilterSettings::default());
-    let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, Demodulation::Light).unwrap();
+    let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, Demodulation::Light, Fireflies::Off).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let made = hooks::take_calls();
     for name in ["vkCreateBuffer", "vkAllocateMemory", "vkCreateComputePipelines"] {

@@ -9,7 +9,7 @@ use bytemuck::Pod;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use tallow::denoise::filter::{self, FilterSettings};
+use tallow::denoise::filter::{self, FilterSettings, firefly::Fireflies};
 use tallow::denoise::{Demodulation, Denoiser, twin};
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PixelFormat, Recorder};
 use tallow::image::aov::{Aovs, Names};
@@ -209,7 +209,7 @@ fn an_engine_filters_its_frames_where_they_are() {
     });
     for (name, demodulation) in [("guided", Demodulation::Light), ("auto", Demodulation::Albedo)] {
         let row = filter::find(name).unwrap();
-        let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, demodulation).unwrap();
+        let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, demodulation, Fireflies::Off).unwrap();
         for _ in 0..2 {
             engine.run(|commands| unsafe {
                 let mut rec = Recorder::external(&gpu, &mut frame, commands.as_raw()).unwrap();

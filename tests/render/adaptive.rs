@@ -3,7 +3,7 @@
 use crate::support::{assert_silent, gpu, largest};
 use std::ops::ControlFlow;
 use std::path::Path;
-use tallow::denoise::filter::{FILTERS, FilterSettings};
+use tallow::denoise::filter::{FILTERS, FilterSettings, firefly::Fireflies};
 use tallow::denoise::{Demodulation, Denoiser};
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
@@ -441,7 +441,9 @@ fn sky_without_samples_takes_no_more_light_than_there_is() {
     let empty = pixels.iter().filter(|pixel| pixel.stats.count == 0).count();
     assert!(empty > 1000, "control: {empty} pixels have no sample");
     for row in &FILTERS[1..] {
-        let denoiser = Denoiser::new(&gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light).unwrap();
+        let denoiser =
+            Denoiser::new(&gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light, Fireflies::Off)
+                .unwrap();
         gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
         let picture = denoiser.picture().read().unwrap();
         let most = largest(picture.iter().flat_map(|pixel| &pixel[..3]).copied());

@@ -2,7 +2,7 @@
 //! filter here as those that suit a CPU.
 use crate::support::{assert_silent, render, tuned_gpu};
 use std::path::Path;
-use tallow::denoise::filter::{FILTERS, FilterSettings, Method, Row};
+use tallow::denoise::filter::{FILTERS, FilterSettings, Method, Row, firefly::Fireflies};
 use tallow::denoise::{Demodulation, Denoiser, Noisy, Recipe, timed};
 use tallow::error::Error;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning};
@@ -43,7 +43,9 @@ fn filtered(gpu: &Gpu, scene: &Loaded) -> Vec<(&'static str, Vec<vec4>)> {
     let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
     render(gpu, &renderer);
     let filter = |row: &&Row| {
-        let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light).unwrap();
+        let denoiser =
+            Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light, Fireflies::Off)
+                .unwrap();
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
         (row.name, denoiser.picture().read().unwrap())
     };

@@ -1,7 +1,7 @@
 //! Compares images that the device filters, of frames and of files, with the same images demodulated, filtered and remodulated by
 //! the twins.
 use crate::picture;
-use crate::support::{assert_silent, gpu, hash};
+use crate::support::{self, assert_silent, gpu, hash};
 use std::path::Path;
 use tallow::denoise::file::Layers;
 use tallow::denoise::filter::firefly::Fireflies;
@@ -152,7 +152,8 @@ impl Frame {
         demodulation: Demodulation,
     ) -> Vec<vec4> {
         self.upload(renderer);
-        let denoiser = Denoiser::new(gpu, renderer, find(filter).unwrap(), settings, demodulation).unwrap();
+        let denoiser =
+            Denoiser::new(gpu, renderer, find(filter).unwrap(), settings, demodulation, Fireflies::Off).unwrap();
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
         denoiser.picture().read().unwrap()
     }
@@ -348,6 +349,30 @@ fn a_film_and_its_file_become_one_picture() {
     assert_silent(&gpu);
 }
 
+/// A frame in the command buffer and an image on its own are cut and filtered alike, where single paths through glass have brought much.
+#[test]
+fn frames_are_cut_as_images_are() {
+    let gpu = gpu();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/glass.toml");
+    let scene = Scene::load(&file).unwrap().with(|s| (s.width, s.height, s.spp) = (64, 64, 4));
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    support::render(&gpu, &renderer);
+    let fixed = FilterSettings::for_scene(&scene);
+    for row in FILTERS.iter().filter(|row| row.name != "none") {
+        let settings = &|_: &Scales| fixed;
+        let recipe = Recipe { demodulation: Some(Demodulation::Light), settings, ..Recipe::new((*row).into()) };
+        let filtered = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap();
+        assert!(filtered.removed.as_ref().is_some_and(|removed| removed.pixels > 0), "control: something is cut");
+        let [r, g, b] = filtered.join(&gpu).unwrap().colour;
+        let denoiser = Denoiser::new(&gpu, &renderer, row, &fixed, Demodulation::Light, Fireflies::Usual).unwrap();
+        gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
+        let picture = denoiser.picture().read().unwrap();
+        let alike = picture.iter().enumerate().all(|(i, p)| p[..3] == [r[i], g[i], b[i]]);
+        assert!(alike, "{}", row.name);
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn expected_errors_agree_with_their_twin() {
     let gpu = gpu();
@@ -409,7 +434,9 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
     let refused = |outputs, policy, demodulation| {
         let renderer = renderer(&gpu, [8, 8], outputs, policy);
         let settings = FilterSettings::default();
-        Denoiser::new(&gpu, &renderer, find("atrous").unwrap(), &settings, demodulation).err().map(|e| e.to_string())
+        Denoiser::new(&gpu, &renderer, find("atrous").unwrap(), &settings, demodulation, Fireflies::Off)
+            .err()
+            .map(|e| e.to_string())
     };
     let has =
         |error: Option<String>, word: &str| assert!(error.as_ref().is_some_and(|e| e.contains(word)), "{error:?}");
@@ -424,20 +451,28 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
     }
     let sparse = renderer_of(&gpu, [8, 8], Outputs::FILTERED, "uniform", 2, 0.0);
     for demodulation in [Demodulation::Albedo, Demodulation::Off] {
-        let whole =
-            Denoiser::new(&gpu, &sparse, find("atrous").unwrap(), &FilterSettings::default(), demodulation).err();
+        let whole = Denoiser::new(
+            &gpu,
+            &sparse,
+            find("atrous").unwrap(),
+            &FilterSettings::default(),
+            demodulation,
+            Fireflies::Off,
+        )
+        .err();
         has(whole.map(|e| e.to_string()), "not every pixel has (indirect_stride)");
     }
     let renderer = renderer(&gpu, [8, 8], Outputs::FILTERED, "uniform");
     let wrong = FilterSettings::default().with(|s| s.edge.extent = -1.0);
     has(
-        Denoiser::new(&gpu, &renderer, find("atrous").unwrap(), &wrong, Demodulation::Light)
+        Denoiser::new(&gpu, &renderer, find("atrous").unwrap(), &wrong, Demodulation::Light, Fireflies::Off)
             .err()
             .map(|e| e.to_string()),
         "extent",
     );
     let right = FilterSettings::default();
-    let foreign = Denoiser::new(&other, &renderer, find("atrous").unwrap(), &right, Demodulation::Light);
+    let foreign =
+        Denoiser::new(&other, &renderer, find("atrous").unwrap(), &right, Demodulation::Light, Fireflies::Off);
     has(foreign.err().map(|e| e.to_string()), "the renderer was made on another device");
     assert_silent(&gpu);
 }
@@ -448,7 +483,8 @@ fn settings_for_a_scene_are_near_those_that_its_image_tells() {
     let renderer = renderer(&gpu, [33, 17], Outputs::FILTERED, "uniform");
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
     let settings = FilterSettings::for_scene(&Scene::load(&file).unwrap());
-    let denoiser = Denoiser::new(&gpu, &renderer, find("svgf").unwrap(), &settings, Demodulation::Albedo).unwrap();
+    let denoiser =
+        Denoiser::new(&gpu, &renderer, find("svgf").unwrap(), &settings, Demodulation::Albedo, Fireflies::Off).unwrap();
     Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
     gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
     let told = settings.scaled_by(&denoiser.scales().unwrap());

@@ -4,7 +4,7 @@
 use anyhow::{Context, Result};
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
-use tallow::denoise::filter::{FILTERS, FilterSettings};
+use tallow::denoise::filter::{FILTERS, FilterSettings, firefly::Fireflies};
 use tallow::denoise::{Demodulation, Denoiser};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning, total_ms};
 use tallow::profile::{median, wake};
@@ -130,7 +130,7 @@ fn filter(gpu: &Gpu, scene: &Loaded, name: &str) -> Result<Run> {
     let mut frame = FrameResources::new(gpu)?;
     Job::new(&renderer).run_to_end(&mut frame)?;
     let row = FILTERS.iter().find(|row| row.name == name).context("no such filter")?;
-    let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light)?;
+    let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light, Fireflies::Off)?;
     let gpu = gpu.clone();
     Ok(Box::new(move || Ok(total_ms(&gpu.run(&mut frame, |rec| denoiser.record(rec))?))))
 }

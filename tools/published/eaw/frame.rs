@@ -4,7 +4,7 @@ use super::VIEWS;
 use crate::Args;
 use crate::published::view::View;
 use crate::published::{Section, push};
-use tallow::denoise::filter::{self, FilterSettings};
+use tallow::denoise::filter::{self, FilterSettings, firefly::Fireflies};
 use tallow::denoise::{Demodulation, Denoiser};
 use tallow::gpu::{FrameResources, Gpu, PassTime};
 use tallow::render::{Outputs, Renderer};
@@ -52,7 +52,7 @@ fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<Milliseconds> {
     let scene = view.load(args, |s| ([s.width, s.height], s.spp) = (SIZE, 1))?;
     let renderer = Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED)?;
     let row = filter::find("atrous").expect("a row of the table");
-    let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light)?;
+    let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light, Fireflies::Off)?;
     let mut frame = FrameResources::new(gpu)?;
     let mut sums = Milliseconds::default();
     for i in 0..=FRAMES {
