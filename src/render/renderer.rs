@@ -394,6 +394,7 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
 }
 
 /// Bytes of device memory that samples in flight take in a render with these effects.
+#[cfg(feature = "cli")]
 pub(crate) fn bytes_in_flight(gpu: &Gpu, scene: &Scene, settings: &Settings, effects: &Effects) -> u64 {
     u64::from(paths_in_flight(gpu, scene, settings, effects)) * FilmBuffers::bytes_per_path(effects)
 }

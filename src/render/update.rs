@@ -40,7 +40,8 @@ impl Renderer {
         self.check_effects(scene, change)?;
         let mut constants = frame_constants(scene, &self.settings)?;
         *self.relabelled.get_mut() = true;
-        if !change.camera {
+        let follows = change.camera || change.framing && self.fingerprint.is_some(); // which a camera that was set takes
+        if !follows {
             constants.camera = self.frame.constants.camera;
         }
         if !change.is_of_camera_alone() {

@@ -9,8 +9,11 @@ use std::ops::Range;
 pub struct Change {
     /// All that a pose can change, whatever the device has of it: see [`Change::everything`].
     pub everything: bool,
-    /// The camera.
+    /// The camera, which a pose has named.
     pub camera: bool,
+    /// Where a camera stands or looks that is to have all of the scene in view. It does not move one that
+    /// [`Renderer::set_camera`](crate::render::Renderer::set_camera) has set.
+    pub framing: bool,
     /// Parts of [`Scene::nodes`](super::Scene::nodes).
     pub nodes: Vec<Range<usize>>,
     /// Parts of [`Scene::triangles`](super::Scene::triangles) and, where there are any, of the shading records.
@@ -64,7 +67,19 @@ impl Change {
 
     /// Whether nothing but the camera has changed.
     pub fn is_of_camera_alone(&self) -> bool {
-        let Self { everything, camera: _, nodes, triangles, instances, materials, texels, lights, deformed, .. } = self;
+        let Self {
+            everything,
+            camera: _,
+            framing: _,
+            nodes,
+            triangles,
+            instances,
+            materials,
+            texels,
+            lights,
+            deformed,
+            ..
+        } = self;
         let arrays = nodes.is_empty() && triangles.is_empty() && texels.is_empty() && deformed.is_empty();
         arrays && !(*everything || *instances || *materials || *lights) // without these, no numbers are new
     }
@@ -86,6 +101,7 @@ impl Change {
         (self.instance_now, self.triangle_now) = (instance_now, number(&self.triangle_now, later.triangle_now)?);
         self.everything |= later.everything;
         self.camera |= later.camera;
+        self.framing |= later.framing;
         self.nodes.extend(later.nodes);
         self.triangles.extend(later.triangles);
         self.instances |= later.instances;

@@ -270,7 +270,8 @@ impl<'a> SceneFile<'a> {
     }
 
     /// Promises that no [`Pose`] will place anything elsewhere or deform it. Instances of few triangles are then stored as meshes of
-    /// their own, through which rays take about half the time. A scene with animations keeps its instances.
+    /// their own, through which rays take about half the time. A scene with animations keeps its instances. `tallow render` loads scenes so: do
+    /// the same for its bits, and to go on with its files.
     pub fn stays_still(&mut self) {
         self.choices.still = true;
     }

@@ -75,7 +75,7 @@ pub struct Vertices {
 /// New numbers of a material, in the units of its [`MaterialTable`](super::description::MaterialTable).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaterialChange {
-    /// Albedo, or the tint of a conductor or mirror, from 0 to 1; of an unlit material what it emits.
+    /// Albedo, or the tint of a conductor or mirror, clamped to 0 to 1 as all tints are; of an unlit material what it emits.
     pub color: Option<[f32; 3]>,
     /// Tint of specular reflection, from 0 to 1; of metallic-roughness the factor of what its index reflects, up to 1e6.
     pub specular: Option<[f32; 3]>,

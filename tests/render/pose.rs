@@ -6,7 +6,7 @@ use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Effects, PixelStats, Texture};
 use tallow::render::{Moves, Outputs, Renderer, Reproject, all_effects, called_for};
-use tallow::scene::description::{LightTable, Rgb};
+use tallow::scene::description::{LightTable, Rgb, Transform};
 use tallow::scene::{Change, Environment, EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: false, guides: true, counters: false };
@@ -271,4 +271,31 @@ fn a_camera_that_is_no_number_is_a_fault_of_its_own() {
     let error = renderer.set_camera(camera).unwrap_err();
     let said = error.to_string();
     assert!(said.starts_with("camera: ") && !said.contains("arrays") && error.exit_code() == 2, "{said}");
+}
+
+/// A camera without a place frames the scene, also as that moves; one that an engine has set stays where it is.
+#[test]
+fn a_camera_that_was_set_stays_where_poses_move_the_frame() {
+    let gpu = gpu();
+    let text = "[film]\nwidth = 16\nheight = 12\n[render]\nspp = 2\nmax_depth = 2\n[environment]\nradiance = 1\n[[mesh]]\nname = 'box'\n\
+                shape = 'cube'\n[[instance]]\nname = 'door'\nmesh = 'box'\n[[instance]]\nmesh = 'box'\n";
+    let Loaded { mut scene, settings, .. } = Scene::parse(Path::new("s.toml"), text).unwrap();
+    let mut renderer = Renderer::new(&gpu, &scene, &settings, Outputs::default()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let mut moved = |renderer: &mut Renderer, x: f64| {
+        let at = Transform::try_from([1., 0., 0., x, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.]).unwrap();
+        let change = scene.apply(&Pose { instances: vec![(0, at)], ..Pose::default() }).unwrap();
+        assert!(change.framing && !change.camera, "{change:?}");
+        gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change)).unwrap();
+        (render(&gpu, renderer), scene.camera([16, 12]).unwrap())
+    };
+    let (framed, own) = moved(&mut renderer, 4.0);
+    renderer.set_camera(own).unwrap();
+    assert!(render(&gpu, &renderer) == framed, "it follows the frame while none was set");
+    let (kept, other) = moved(&mut renderer, 40.0);
+    renderer.set_camera(own).unwrap();
+    assert!(render(&gpu, &renderer) == kept && own != other, "it stays");
+    renderer.set_camera(other).unwrap();
+    assert!(render(&gpu, &renderer) != kept, "control: the frame has moved");
+    assert_silent(&gpu);
 }

@@ -94,8 +94,8 @@ fn a_pose_that_changes_nothing_leaves_the_scene_what_it_is() {
     };
     // A camera with a matrix does not look elsewhere because something moves; one that frames the scene does, if only from a target.
     let mut aimed = scene_of(&free.replace("[camera]", "[camera]\ntarget = [0, 0, 0]"));
-    assert!(!scene.apply(&to(4.0)).unwrap().camera && framed.apply(&to(4.0)).unwrap().camera);
-    assert!(aimed.apply(&to(0.25)).unwrap().camera, "however little the film's other shape would show of it");
+    assert!(!scene.apply(&to(4.0)).unwrap().framing && framed.apply(&to(4.0)).unwrap().framing);
+    assert!(aimed.apply(&to(0.25)).unwrap().framing, "however little the film's other shape would show of it");
     assert!(!is_known(&scene), "control");
     scene.apply(&to(0.0)).unwrap();
     assert!(is_known(&scene), "away and back");

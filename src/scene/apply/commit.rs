@@ -45,7 +45,7 @@ pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
         (scene.view, change.camera) = (camera.clone(), true);
     }
     // A camera without a position or a target looks at where the scene reaches now.
-    change.camera |= scene.view.frames_scene() && scene.bounds != before;
+    change.framing = scene.view.frames_scene() && scene.bounds != before;
     identify(scene);
     Ok(change)
 }
