@@ -80,6 +80,14 @@ vec3 significant(Window sum, vec3 given, float prior) {
     return off > noise ? residual * (1.0 - noise / off) : vec3(0.0);
 }
 
+// A pixel that is darker than its blend may have missed light by chance, of which its own variance tells nothing: it counts as no less noisy
+// than like pixels around are on average.
+Window doubted(Window own, vec3 given, Window wide) {
+    bool darker = contrast(own.residual / max(own.total, 1e-20), given) < 0.0;
+    if (darker) own.variance = max(own.variance, own.count * wide.variance / max(wide.count, 1e-20));
+    return own;
+}
+
 // The range of light that a pixel's blend and those of the other surfaces beside it have.
 struct Edge {
     vec3 own;
@@ -114,7 +122,7 @@ vec4 with_residual(int i, Pixel p, vec4 blended, Window windows[3], vec3 least, 
     // An estimate over 7x7 pixels tells nothing of smaller windows.
     if (blended.w >= 0.0) {
         given += significant(windows[1], given, prior);
-        given += significant(windows[2], given, prior);
+        given += significant(doubted(windows[2], given, windows[0]), given, prior);
     }
     light = max(blended.rgb + given, least);
     if (blurred(i)) return vec4(light, count); // has no edges

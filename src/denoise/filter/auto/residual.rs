@@ -72,6 +72,13 @@ impl Window {
         let off = contrast(residual, Vec3::ZERO).abs();
         if off > noise { residual * (1.0 - noise / off) } else { Vec3::ZERO }
     }
+
+    /// One pixel, if it is darker than its blend no less noisy than like pixels around: see `doubted` of the kernel.
+    fn doubted(self, given: Vec3, wide: &Self) -> Self {
+        let darker = contrast(self.residual / self.weights.max(1e-20), given) < 0.0;
+        let around = self.samples * wide.variance / wide.samples.max(1e-20);
+        Self { variance: if darker { self.variance.max(around) } else { self.variance }, ..self }
+    }
 }
 
 /// What the blend of a pixel differs by from its samples.
@@ -148,7 +155,10 @@ fn restored(
         return own.blended.max(least);
     }
     let used = if own.measured { 3 } else { 1 };
-    let given = windows[..used].iter().fold(Vec3::ZERO, |given, window| given + window.significant(given, prior));
+    let given =
+        windows[..used.min(2)].iter().fold(Vec3::ZERO, |given, window| given + window.significant(given, prior));
+    let alone = windows[2].doubted(given, &windows[0]);
+    let given = if used == 3 { given + alone.significant(given, prior) } else { given };
     let light = (own.blended + given).max(least);
     if own.blurred { light } else { edge.light(light, p.colour, own.noise) }
 }
