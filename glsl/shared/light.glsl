@@ -181,7 +181,7 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     vec3 a = light.a, e1 = light.b - a, e2 = light.c - a;
     float doubled_area;
     vec3 n = unit_vector(cross(e1, e2), doubled_area);
-    SphericalTriangle seen;
+    SphericalTriangle seen = SphericalTriangle(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0);
     if (FX_LARGE_LAMPS) {
         seen = spherical_triangle(a - p, e1, e2);
         vec3 w = sample_spherical_triangle(seen, u);

@@ -24,15 +24,15 @@ impl Denoiser {
     /// seen, give that of what is. `sigma_rt` is in units of `intensity`: give the radiance of what is white in your frames.
     /// [`Filtered`](super::Filtered) finds both by itself, but waits for the device.
     ///
-    /// Of few samples, leave `fireflies` at [`Fireflies::Usual`], as the command line does: one pixel that a single bright path has brought
-    /// may have more error than all others together.
+    /// Of few samples, let `fireflies` be [`Fireflies::Usual`], as the command line does for all rows but `none`: one pixel that a single bright
+    /// path has brought may have more error than all others together.
     ///
     /// Where the renderer's policy may leave pixels without a sample, these take direct light from the others, which the filter
     /// runs for once more.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings out of range and for a renderer without what the filter needs, [`Error::Device`] when
-    /// the film is too large for the device's bindings, or `renderer` was made on another device.
+    /// [`Error::Usage`] for settings out of range, for a renderer without what the filter needs, and for one with an
+    /// `indirect_stride` without [`Demodulation::Light`]; [`Error::Device`] when the film is too large for the device's bindings, or `renderer` was made on another device.
     pub fn new(
         gpu: &Gpu,
         renderer: &Renderer,

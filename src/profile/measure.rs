@@ -2,9 +2,8 @@
 use super::ceilings::{self, Ceilings};
 use super::frames::{Frames, Workload};
 use super::work::FrameWork;
-use crate::denoise::Recipe;
 use crate::denoise::filter::{FilterSettings, Row};
-use crate::denoise::{Denoiser, Noisy};
+use crate::denoise::{Denoiser, Noisy, Recipe};
 use crate::error::Result;
 use crate::gpu::{Calibration, FrameResources, Gpu};
 use crate::machine::{device_mhz, wake};

@@ -91,7 +91,8 @@ impl Renderer {
 
     /// Chooses the index of each pixel's first sample in its sequence, from the next [`Step::Start`] or [`Step::Reproject`] on. One of
     /// them has to follow before more samples are taken. Behind index 2^32 - 1 comes 0; a film that begins within 2^24 of there can be
-    /// neither resumed nor merged. As a setting it goes to 2^24 only: set it anew in a renderer that takes this one's settings.
+    /// neither resumed nor merged. As a setting it is at most 2^24, so that a
+    /// renderer that is made of [`Renderer::settings`] may need this call again.
     pub fn set_first_sample(&mut self, first_sample: u32) {
         *self.relabelled.get_mut() |= self.settings.first_sample != first_sample;
         self.frame.first_sample = first_sample;

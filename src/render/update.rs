@@ -19,6 +19,8 @@ impl Renderer {
     /// arrays that were edited by hand are brought by [`Change::everything`], which has them checked; but spheres that are traced by ray
     /// queries need a new renderer.
     ///
+    /// A camera that [`Renderer::set_camera`] has set stays, until a pose names one, or with [`Change::everything`].
+    ///
     /// What is recorded has to be submitted, in this order: later updates bring only what changed since. After a recording that was thrown
     /// away, update with [`Change::everything`].
     ///
@@ -40,8 +42,9 @@ impl Renderer {
         self.check_effects(scene, change)?;
         let mut constants = frame_constants(scene, &self.settings)?;
         *self.relabelled.get_mut() = true;
-        let follows = change.camera || change.framing && self.fingerprint.is_some(); // which a camera that was set takes
-        if !follows {
+        // Without a fingerprint the camera is not the scene's but one that was set.
+        let follows_scene = self.fingerprint.is_some();
+        if !(change.camera || change.framing && follows_scene) {
             constants.camera = self.frame.constants.camera;
         }
         if !change.is_of_camera_alone() {

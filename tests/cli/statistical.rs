@@ -170,7 +170,7 @@ fn what_cannot_be_tested_is_one_line() {
     complains(&compare(&folder, "a.exr b.exr --at 256x256"), 3, &["256x256", "pixel, 4x4, 16x16, image"]);
     complains(&compare(&folder, "a.exr b.exr --at 5x5"), 2, &["'5x5'", "16x16"]);
     complains(&compare(&folder, "a.exr b.exr --false-alarms 0"), 2, &["above 0"]);
-    complains(&compare(&folder, "a.exr b.exr --resolve 0"), 2, &["above 0"]);
+    complains(&compare(&folder, "a.exr b.exr --resolve 0"), 2, &["at least 1e-12"]);
     complains(&compare(&folder, "a.exr b.exr --layer N"), 2, &["--layer"]);
     complains(&compare(&folder, "a.exr b.exr --max-mse 1"), 2, &["--max-mse"]);
     complains(&compare(&folder, "a.exr b.exr --map a.exr"), 2, &["a.exr", ".png"]);

@@ -39,7 +39,7 @@ fn nothing_is_created_after_the_first_frame() {
     let outputs = Outputs { split_light: true, guides: true, counters: true };
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
     let (row, settings) = (filter::find("auto").unwrap(), FilterSettings::default());
-    let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, Demodulation::Light, Fireflies::Off).unwrap();
+    let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, Demodulation::Light, Fireflies::Usual).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let made = hooks::take_calls();
     for name in ["vkCreateBuffer", "vkAllocateMemory", "vkCreateComputePipelines"] {

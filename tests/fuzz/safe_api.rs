@@ -445,6 +445,10 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
     let error = Renderer::new(&GPU, &nowhere, &nowhere.settings, Outputs::default()).err();
     assert!(matches!(error, Some(Error::Usage(_))), "a camera is no array: {error:?}");
     assert!(Renderer::new(&GPU, &SCENE, &SCENE.settings, Outputs::default()).is_ok(), "control");
+}
+
+#[test]
+fn a_camera_that_no_ray_can_leave_is_refused() {
     let mut renderer = Renderer::new(&GPU, &SCENE, &SCENE.settings, Outputs::default()).unwrap();
     let camera = SCENE.camera([16, 16]).unwrap();
     for (camera, needs) in [

@@ -68,9 +68,12 @@ fn what_is_no_image_is_refused() {
     assert!(test(&good, &good, &Options::default()).is_ok(), "control");
     let mut broken = good.clone();
     broken.mean[3][1] = f32::NAN;
-    says(&broken, Options::default(), "image A: a value is no finite number");
-    says(&Estimate { mean: Vec::new(), ..good.clone() }, Options::default(), "16 pixels, but [0, 16, 16] means");
-    says(&Estimate { objects: Some(vec![1]), ..good.clone() }, Options::default(), "[16, 16, 1]");
+    says(&broken, Options::default(), "image A: 1 of 16 pixels are NaN or infinite, the first (3, 0)");
+    says(&Estimate { mean: Vec::new(), ..good.clone() }, Options::default(), "16 pixels, but [0, 16, 16, 16] means");
+    says(&Estimate { objects: Some(vec![1]), ..good.clone() }, Options::default(), "[16, 16, 16, 1]");
+    let noise = |m2: f32, counts: usize| Noise::Samples { m2: vec![[m2; 3]; 16], count: vec![8.0; counts] };
+    says(&Estimate { noise: noise(1.0, 3), ..good.clone() }, Options::default(), "[16, 16, 3, 16]");
+    says(&Estimate { noise: noise(-1.0, 16), ..good.clone() }, Options::default(), "variances or counts are negative");
     says(&good, Options { accept: f64::INFINITY, ..Options::default() }, "both finite");
     for resolve in [f64::NAN, 0.0, 1e-300] {
         says(&good, Options { resolve, ..Options::default() }, "must be at least 1e-12");

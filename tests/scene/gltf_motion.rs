@@ -126,6 +126,20 @@ fn what_is_flattened_along_an_axis_moves() {
     assert_eq!(loaded.warnings, Vec::<String>::new());
     assert_eq!(corners(&loaded, 0.0), [[0.0; 3], [2.0, 0.0, 0.0], [0.0; 3]]);
     assert_eq!(corners(&loaded, 2.0), [[0.0, 0.0, 4.0], [2.0, 0.0, 4.0], [0.0, 3.0, 4.0]]);
+    // Turned below and above the scale: no determinant is exactly 0.
+    let mut json = triangle();
+    json["nodes"][0]["rotation"] = json!([0.36, 0.48, 0.48, 0.64]);
+    let parent = json["nodes"].as_array().unwrap().len();
+    push(&mut json, "nodes", json!({ "children": [0], "scale": [2, 0, 1], "rotation": [0.64, -0.48, 0.48, 0.36] }));
+    push(&mut json, "nodes", json!({ "children": [parent] }));
+    json["scenes"][0]["nodes"] = json!([parent + 1, 1]);
+    animate(&mut json, parent + 1, "translation", &[0.0, 0.0, 0.0, 0.0, 0.0, 4.0], "VEC3");
+    let loaded = load(&json);
+    let [from, to] = [0.0, 2.0].map(|at| corners(&loaded, at));
+    assert!(from[1] != from[2] && from[1] != from[0] && from[2] != from[0], "{from:?}");
+    for ([x, y, z], b) in from.iter().zip(to) {
+        assert!((glam::Vec3::from(b) - glam::vec3(*x, *y, z + 4.0)).length() < 1e-5, "{from:?}");
+    }
     // Weights of a mesh on a flattened node.
     let mut json = triangle();
     json["nodes"][0]["scale"] = json!([2, 1, 0]);

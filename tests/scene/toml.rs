@@ -566,13 +566,14 @@ fn keys_that_change_nothing_are_told() {
     assert_eq!(sun, ["light 1: a directional light does not read position, intensity, cone"]);
     let spot = lamp(&format!("type = \"spot\"\n{position}{direction}intensity = 1\ncutoff = 10\ncone = 2\n"));
     assert_eq!(spot, Vec::<String>::new());
+    let cube = parse(&format!("{BOX}[[mesh]]\nshape = \"cube\"\nsegments = 8\n")).unwrap().scene.warnings;
+    assert_eq!(cube, ["mesh \"cube\": only spheres and disks read segments"]);
     for (more, says) in [
         (
             "[environment]\nrotation = 9\nworld_from_environment = [1, 0, 0, 0, 1, 0, 0, 0, 1]\n",
             "has both rotation and",
         ),
         ("[[material]]\nname = \"m\"\ntype = \"conductor\"\nmetal = \"Au\"\neta = 1\n", "has both metal and eta or k"),
-        ("[[mesh]]\nshape = \"cube\"\nsegments = 8\n", "has segments, which are for spheres and disks"),
     ] {
         let line = error(&format!("{BOX}{more}"));
         assert!(line.contains(says), "{line}");

@@ -354,21 +354,27 @@ fn a_film_and_its_file_become_one_picture() {
 fn frames_are_cut_as_images_are() {
     let gpu = gpu();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/glass.toml");
-    let scene = Scene::load(&file).unwrap().with(|s| (s.width, s.height, s.spp) = (64, 64, 4));
-    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
-    support::render(&gpu, &renderer);
-    let fixed = FilterSettings::for_scene(&scene);
-    for row in FILTERS.iter().filter(|row| row.name != "none") {
-        let settings = &|_: &Scales| fixed;
-        let recipe = Recipe { demodulation: Some(Demodulation::Light), settings, ..Recipe::new((*row).into()) };
-        let filtered = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap();
-        assert!(filtered.removed.as_ref().is_some_and(|removed| removed.pixels > 0), "control: something is cut");
-        let [r, g, b] = filtered.join(&gpu).unwrap().colour;
-        let denoiser = Denoiser::new(&gpu, &renderer, row, &fixed, Demodulation::Light, Fireflies::Usual).unwrap();
-        gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
-        let picture = denoiser.picture().read().unwrap();
-        let alike = picture.iter().enumerate().all(|(i, p)| p[..3] == [r[i], g[i], b[i]]);
-        assert!(alike, "{}", row.name);
+    let loaded = Scene::load(&file).unwrap();
+    let fixed = FilterSettings::for_scene(&loaded);
+    for stride in [1, 2] {
+        let scene = loaded.clone().with(|s| (s.width, s.height, s.spp, s.indirect_stride) = (64, 64, 4, stride));
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+        support::render(&gpu, &renderer);
+        for row in FILTERS.iter().filter(|row| row.name != "none") {
+            let settings = &|_: &Scales| fixed;
+            let recipe = Recipe { demodulation: Some(Demodulation::Light), settings, ..Recipe::new((*row).into()) };
+            let filtered = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap();
+            assert!(filtered.removed.as_ref().is_some_and(|removed| removed.pixels > 0), "control: something is cut");
+            let [r, g, b] = filtered.join(&gpu).unwrap().colour;
+            let denoiser = Denoiser::new(&gpu, &renderer, row, &fixed, Demodulation::Light, Fireflies::Usual).unwrap();
+            let mut frame = FrameResources::new(&gpu).unwrap();
+            for _ in 0..2 {
+                gpu.run(&mut frame, |rec| denoiser.record(rec)).unwrap();
+                let picture = denoiser.picture().read().unwrap();
+                let alike = picture.iter().enumerate().all(|(i, p)| p[..3] == [r[i], g[i], b[i]]);
+                assert!(alike, "{}, a stride of {stride}", row.name);
+            }
+        }
     }
     assert_silent(&gpu);
 }

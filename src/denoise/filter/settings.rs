@@ -54,7 +54,7 @@ impl FilterSettings {
         Self { edge: scales.applied_to(self.edge), ..self }
     }
 
-    /// The same, but of what is not at its default already: that was asked for, and stays.
+    /// The same, but of what is not at its default already: that was asked for, and stays. What is asked for at its default is not told apart.
     pub fn scaled_at_defaults(self, scales: &Scales) -> Self {
         let (own, usual, found) = (self.edge, EdgeSettings::default(), scales.applied_to(self.edge));
         let of = |read: fn(&EdgeSettings) -> f32| if read(&own) == read(&usual) { read(&found) } else { read(&own) };

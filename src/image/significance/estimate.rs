@@ -32,7 +32,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Checks that there is a value for every pixel, and that all are numbers.
+    /// Checks that there is a value for every pixel, and that means are numbers, variances and counts numbers from 0 on.
     ///
     /// # Errors
     /// What is missing.
@@ -40,16 +40,33 @@ impl Estimate {
         let pixels = self.width as usize * self.height as usize;
         let objects = self.objects.as_ref().map_or(pixels, Vec::len);
         let (squares, counts) = match &self.noise {
-            Noise::Samples { m2, count } => (m2, &count[..]),
-            Noise::SquaredErrors(squares) => (squares, &[][..]),
+            Noise::Samples { m2, count } => (m2, count.len()),
+            Noise::SquaredErrors(squares) => (squares, pixels),
         };
-        let lengths = [self.mean.len(), squares.len(), objects];
-        let counted = counts.is_empty() || counts.len() == pixels;
-        if pixels == 0 || !counted || lengths.iter().any(|&length| length != pixels) {
-            return Err(format!("{pixels} pixels, but {lengths:?} means, noises and objects"));
+        let lengths = [self.mean.len(), squares.len(), counts, objects];
+        if pixels == 0 || lengths.iter().any(|&length| length != pixels) {
+            return Err(format!("{pixels} pixels, but {lengths:?} means, variances, counts and objects"));
         }
-        let mut numbers = self.mean.iter().chain(squares).flatten().chain(counts);
-        if numbers.all(|v| v.is_finite()) { Ok(()) } else { Err("a value is no finite number".to_owned()) }
+        let is_broken = |m: &[f32; 3]| !m.iter().all(|v| v.is_finite());
+        if let Some(first) = self.mean.iter().position(is_broken) {
+            let (broken, all) = (self.mean.iter().filter(|m| is_broken(m)).count(), self.mean.len());
+            let [x, y] = [first as u32 % self.width, first as u32 / self.width];
+            return Err(format!(
+                "{broken} of {all} pixels are NaN or infinite, the first ({x}, {y}): render the image anew"
+            ));
+        }
+        let positive = |v: &f32| v.is_finite() && *v >= 0.0;
+        let counted = match &self.noise {
+            Noise::Samples { count, .. } => count.iter().all(positive),
+            Noise::SquaredErrors(_) => true,
+        };
+        match counted && squares.iter().flatten().all(positive) {
+            true => Ok(()),
+            false => {
+                Err("its variances or counts are negative, NaN or infinite: take the file as it was rendered"
+                    .to_owned())
+            }
+        }
     }
 
     /// Takes the means, the noise and the objects of a film. Of a filtered film the noisy image is taken.
@@ -99,25 +116,7 @@ impl Estimate {
     }
 
     fn checked(self) -> Result<Self, String> {
-        let finite = |values: &[[f32; 3]]| values.iter().flatten().all(|v| v.is_finite());
-        let positive = |values: &[[f32; 3]]| values.iter().flatten().all(|v| v.is_finite() && *v >= 0.0);
-        let is_broken = |m: &[f32; 3]| !m.iter().all(|v| v.is_finite());
-        if let Some(first) = self.mean.iter().position(is_broken) {
-            let (broken, all) = (self.mean.iter().filter(|m| is_broken(m)).count(), self.mean.len());
-            let [x, y] = [first as u32 % self.width, first as u32 / self.width];
-            return Err(format!(
-                "{broken} of {all} pixels are NaN or infinite, the first ({x}, {y}): render the image anew"
-            ));
-        }
-        let sound = match &self.noise {
-            Noise::Samples { m2, count } => positive(m2) && count.iter().all(|n| n.is_finite() && *n >= 0.0),
-            Noise::SquaredErrors(errors) => finite(errors) && positive(errors),
-        };
-        if !sound {
-            return Err(
-                "its variances or counts are negative, NaN or infinite: take the file as it was rendered".to_owned()
-            );
-        }
+        self.check()?;
         match &self.noise {
             Noise::Samples { count, .. } if count.iter().all(|n| *n < 2.0) => Err(
                 "no pixel has two samples, so that nothing tells its noise: render it with --spp 2 or more, 16 to judge \

@@ -1,6 +1,6 @@
 //! The list of lights, the table that chooses one in proportion to its power, and where there are many a tree over them. The table takes
 //! delta lights and the small bright parts of a sky's picture [`DELTA_WEIGHT`] times as often, those at infinity and the others at least [`LEAST_SHARE`] of the time each, the others
-//! beside a sky without suns at least [`LEAST_BESIDE_SKY`]. Beside suns alone, a sky of one colour is not chosen.
+//! beside a sky without directional lights at least [`LEAST_BESIDE_SKY`]. Beside suns alone, a sky of one colour is not chosen.
 //!
 //! Power, by luminance, in watts up to a common factor: emissive triangle or sphere `pi * area * L` (L the mean over its texture
 //! times the mean opacity, twice that where both sides shine), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
@@ -305,6 +305,7 @@ const DELTA_WEIGHT: f64 = 8.0;
 /// Luminance over the mean of a sky's picture above which its light counts as a delta light's: a sun in it is as hard to find by BSDF sampling.
 const PEAK: f64 = 16.0;
 
+/// How much more often than by its power a light is chosen.
 fn weight(scene: &Scene, light: &Light) -> f64 {
     match light.kind {
         LIGHT_ENVIRONMENT => 1.0 + (DELTA_WEIGHT - 1.0) * scene.rig.sky_peaks,
@@ -327,7 +328,7 @@ fn leave_sky(scene: &Scene, lights: &[Light], weights: &mut [f64]) {
 /// a lamp hardly brighter than the sky, .039; with shares of .1 and .25 .00035, .00022, .00016, .039 and .00017, .00034, .00023, .025.
 const LEAST_SHARE: f64 = 0.25;
 
-/// Least share that lights in the scene get beside a sky without suns, which BSDF sampling finds as well. At 8 and 16 samples a pixel a
+/// Least share that lights in the scene get beside a sky without directional lights, most of which BSDF sampling finds as well. At 8 and 16 samples a pixel a
 /// share of .5 leaves .27 to .91 of the variance that .25 does in eleven scenes, and 1.00 and 1.08 of it where a lamp shines below the
 /// picture of a sky. Beside suns it leaves .8 in Sponza, 1.08 on grass and 1.3 to 1.5 on snow by day, where lamps hardly matter.
 const LEAST_BESIDE_SKY: f64 = 0.5;

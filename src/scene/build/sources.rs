@@ -118,6 +118,10 @@ impl<'a> Sources<'a> {
     pub fn read_files(&mut self) -> Result<()> {
         for mesh in &self.description.mesh {
             self.check(mesh)?;
+            if mesh.segments.is_some() && !matches!(mesh.shape, Some(Shape::Sphere | Shape::Disk)) {
+                let what = format!("mesh \"{}\": only spheres and disks read segments", mesh_name(mesh));
+                self.library.warnings.push(what);
+            }
             let Some(path) = self.file_of(mesh) else { continue };
             if !self.files.contains_key(&path) {
                 let parsed = mesh_file::load(&path, Numbering::Shared, &mut self.library)?;
@@ -147,9 +151,6 @@ impl<'a> Sources<'a> {
             return Err(self.at(place(), "has a clip, which is for glTF files"));
         }
         mesh.data.as_ref().map_or(Ok(()), Mesh::check).map_err(|what| self.at(place(), what))?;
-        if mesh.segments.is_some() && !matches!(mesh.shape, Some(Shape::Sphere | Shape::Disk)) {
-            return Err(self.at(place(), "has segments, which are for spheres and disks"));
-        }
         match mesh.segments.filter(|n| !(3..=4096).contains(n)) {
             Some(n) => Err(self.at(place(), format!("segments is {n}: choose a value from 3 to 4096"))),
             None => Ok(()),

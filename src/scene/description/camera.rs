@@ -33,11 +33,11 @@ pub struct Camera {
     /// Row-major 4 x 4; the camera looks along -z, +x is right, +y is up. Scales and shear are
     /// dropped, a mirror is kept: the view keeps its axis, and up its plane with it.
     pub world_from_camera: Option<[f64; 16]>,
-    /// Degrees along `fov_axis`, above 0 and below 180; default 40.
+    /// Degrees along `fov_axis`, from 1e-6 and below 180; default 40.
     pub fov: Option<f64>,
     /// Edge of the film that `fov` spans; default the height.
     pub fov_axis: FovAxis,
-    /// Length of that edge in world units, above 0, in place of `fov`: rays are parallel, and what is far is as large as what is near.
+    /// Length of that edge in world units, from 1e-12 to 1e12, in place of `fov`: rays are parallel, and what is far is as large as what is near.
     pub orthographic: Option<f64>,
     /// Radius of the lens; 0 (default) is a pinhole.
     pub lens_radius: f32,
@@ -54,7 +54,7 @@ pub struct Camera {
 /// Position and orthonormal axes (right, up, forward).
 type Frame = (DVec3, [DVec3; 3]);
 
-/// Degrees: rays of a narrower view are one, up to rounding.
+/// Degrees; the axes of a narrower view are lost beside its direction.
 const LEAST_FOV: f64 = 1e-6;
 /// World units.
 const LEAST_EDGE: f64 = 1e-12;

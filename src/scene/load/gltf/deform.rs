@@ -63,7 +63,7 @@ pub fn deformed(primitive: &Primitive, weights: &[f32], matrices: Option<&[DAffi
         let mut mirrored = vec![false; mesh.positions.len()];
         for (vertex, mirrored) in mirrored.iter_mut().enumerate() {
             let matrix = blended(primitive, vertex, matrices);
-            *mirrored = matrix.matrix3.determinant() < 0.0;
+            *mirrored = mirrors(&matrix.matrix3);
             mesh.positions[vertex] = matrix.transform_point3(double(mesh.positions[vertex])).as_vec3().to_array();
             if let Some(normal) = mesh.normals.get_mut(vertex) {
                 *normal = turned_normal(&matrix, double(*normal)).as_vec3().to_array();
@@ -107,12 +107,23 @@ fn blended(primitive: &Primitive, vertex: usize, matrices: &[DAffine3]) -> DAffi
     }
 }
 
+/// Whether a transform takes space to a plane, a line or a point, up to rounding: of turned parents and children of a scale of 0 hardly any has
+/// a determinant of exactly 0.
+pub fn is_flat(m: &DMat3) -> bool {
+    const ROUNDING: f64 = 1e-14;
+    m.determinant().abs() <= ROUNDING * m.x_axis.length() * m.y_axis.length() * m.z_axis.length()
+}
+
+fn mirrors(m: &DMat3) -> bool {
+    m.determinant() < 0.0 && !is_flat(m)
+}
+
 /// Normals are turned by the cofactors, which are the inverse transpose times the determinant, and tell the normal of the plane where joints
 /// flatten the surface.
 fn turned_normal(matrix: &DAffine3, normal: DVec3) -> DVec3 {
     let DMat3 { x_axis: x, y_axis: y, z_axis: z } = matrix.matrix3;
     let turned = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * normal;
-    let outward = if matrix.matrix3.determinant() < 0.0 { -turned } else { turned };
+    let outward = if mirrors(&matrix.matrix3) { -turned } else { turned };
     outward.normalize_or(normal)
 }
 

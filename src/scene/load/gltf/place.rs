@@ -2,7 +2,7 @@
 //! of their own where joints or morph targets move them.
 use super::asset::{Asset, one_line};
 use super::clip::Channel;
-use super::deform::{Skin, deformed};
+use super::deform::{Skin, deformed, is_flat};
 use super::instancing;
 use super::material;
 use super::motion::{MovedInstance, MovedMesh};
@@ -133,17 +133,8 @@ impl<'a> Placer<'a> {
         let bends = self.meshes[&mesh].iter().any(bends);
         let name = json.name.as_ref().or(self.asset.root.meshes[mesh].name.as_ref());
         let name = name.map_or_else(|| format!("node {node}"), |name| one_line(name));
-        for primitive in self.meshes[&mesh].clone() {
-            if flattened.is_empty() || skin.is_some() && !primitive.joints.is_empty() {
-                continue;
-            }
-            let primitive = Arc::new(primitive.of_one_joint());
-            for Copy { node, own } in &flattened {
-                let skin = Some(Arc::new(Skin::of_node(*node, *own)));
-                let (number, weights) = (self.tables.len(), weights.cloned().unwrap_or_default());
-                let bent = MovedMesh { number, node: *node, primitive: primitive.clone(), skin, weights };
-                self.add_bent(&name, bent, &[])?;
-            }
+        if !flattened.is_empty() {
+            self.add_moving_flattened(&name, self.meshes[&mesh].clone(), (&flattened, weights, skin.is_some()))?;
         }
         if !bends {
             self.placed.entry(mesh).or_default().extend(copies);
@@ -153,6 +144,26 @@ impl<'a> Placer<'a> {
             let skin = skin.clone().filter(|_| !primitive.joints.is_empty());
             let weights = weights.cloned().unwrap_or_default();
             self.add_bent(&name, MovedMesh { number: self.tables.len(), node, primitive, skin, weights }, &copies)?;
+        }
+        Ok(())
+    }
+
+    /// Adds what moves and is flattened along an axis: its vertices are placed in every pose, as by a skin of one joint. Primitives of a skin are
+    /// where their joints are.
+    fn add_moving_flattened(
+        &mut self,
+        name: &str,
+        primitives: Vec<Arc<Primitive>>,
+        (copies, weights, is_skinned): (&[Copy], Option<&Vec<f32>>, bool),
+    ) -> Result<()> {
+        for primitive in primitives.iter().filter(|primitive| !is_skinned || primitive.joints.is_empty()) {
+            let primitive = Arc::new(primitive.of_one_joint());
+            for Copy { node, own } in copies {
+                let skin = Some(Arc::new(Skin::of_node(*node, *own)));
+                let (number, weights) = (self.tables.len(), weights.cloned().unwrap_or_default());
+                let bent = MovedMesh { number, node: *node, primitive: primitive.clone(), skin, weights };
+                self.add_bent(name, bent, &[])?;
+            }
         }
         Ok(())
     }
@@ -255,7 +266,7 @@ impl<'a> Placer<'a> {
         copies.retain(|copy| {
             let world = Transform::from(self.world(copy));
             // What moves may be flat at rest alone.
-            self.moved.nodes[node] || world.has_inverse() || spans_a_plane(&world.0)
+            self.moved.nodes[node] || is_solid(&world) || spans_a_plane(&world.0)
         });
         self.flat += usize::from(copies.is_empty());
         Ok(copies)
@@ -264,7 +275,7 @@ impl<'a> Placer<'a> {
     /// Whether it is flattened along one axis, and no fixed mesh can show it: no instance has such a transform.
     fn moves_flattened(&self, copy: &Copy) -> bool {
         let (world, moved) = (Transform::from(self.world(copy)), &self.moved);
-        (moved.nodes[copy.node] || moved.weights[copy.node]) && !world.has_inverse() && spans_a_plane(&world.0)
+        (moved.nodes[copy.node] || moved.weights[copy.node]) && !is_solid(&world) && spans_a_plane(&world.0)
     }
 
     fn world(&self, copy: &Copy) -> DAffine3 {
@@ -274,7 +285,7 @@ impl<'a> Placer<'a> {
     /// Adds a mesh at every one of `copies`: baked where it is flattened, as instances where there are several, or where its node
     /// moves.
     fn add(&mut self, name: &str, mesh: Mesh, material: Option<usize>, copies: &[Copy]) -> Result<()> {
-        let stays_whole = |copy: &&Copy| self.moved.nodes[copy.node] || Transform::from(self.world(copy)).has_inverse();
+        let stays_whole = |copy: &&Copy| self.moved.nodes[copy.node] || is_solid(&Transform::from(self.world(copy)));
         let (copies, flat): (Vec<Copy>, Vec<Copy>) = copies.iter().partition(stays_whole);
         for copy in flat {
             self.add_flattened(name, &mesh, material, &copy)?;
@@ -296,7 +307,7 @@ impl<'a> Placer<'a> {
             let (number, Copy { node, own }) = (self.instances.len(), copy);
             self.found.instances.extend(self.moved.nodes[node].then_some(MovedInstance { number, node, own }));
             let world = Transform::from(self.world(&copy));
-            let transform = if world.has_inverse() { world } else { speck(&world.0) };
+            let transform = if is_solid(&world) { world } else { speck(&world.0) };
             self.instances.push(InstanceTable { mesh: mesh.clone(), transform, ..InstanceTable::default() });
         }
         Ok(())
@@ -369,6 +380,11 @@ impl Names {
         self.0.insert(free.clone(), 1);
         free
     }
+}
+
+/// Whether a transform leaves meshes an extent in all directions, so that an instance can have it.
+fn is_solid(transform: &Transform) -> bool {
+    transform.has_inverse() && !is_flat(&transform.0.matrix3)
 }
 
 /// Whether a transform leaves meshes two directions at least. The bound is the square of the scale below which
