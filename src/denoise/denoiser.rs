@@ -32,7 +32,8 @@ impl Denoiser {
     ///
     /// # Errors
     /// [`Error::Usage`] for settings out of range, for a renderer without what the filter needs, and for one with an
-    /// `indirect_stride` without [`Demodulation::Light`]; [`Error::Device`] when the film is too large for the device's bindings, or `renderer` was made on another device.
+    /// `indirect_stride` without [`Demodulation::Light`]; [`Error::Device`] when the film is too large for the
+    /// device's bindings, or `renderer` was made on another device.
     pub fn new(
         gpu: &Gpu,
         renderer: &Renderer,

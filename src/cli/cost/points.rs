@@ -122,7 +122,8 @@ fn possible(variants: Vec<Candidate>, notes: &mut Vec<String>) -> Result<Vec<Can
 }
 
 /// The command that renders a point's first image of `scene`, which are words for a shell. Unfiltered points go to .hdr: for an .exr more
-/// layers are kept, which takes longer than what was measured. `device` is the option that chooses it, if any. Filters with settings of their own run behind the render, to the same bits.
+/// layers are kept, which takes longer than what was measured. `device` is the option that chooses it, if any. Filters
+/// with settings of their own run behind the render, to the same bits.
 pub fn command(
     scene: &str,
     judged: Option<JudgedFrame>,

@@ -117,7 +117,8 @@ pub trait Filter: Send + Sync {
     /// radiance\[P\], guide\[P\], variance\[P\] -> output\[P\]
     ///
     /// # Errors
-    /// [`Error::Usage`] for planes of another size, and for an output that is the radiance; [`Error::Device`] when the image is too large for the device.
+    /// [`Error::Usage`] for planes of another size, and for an output that is the radiance; [`Error::Device`] when the image is too large
+    /// for the device.
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()>;
 
     /// Where the filter estimates its own error, what its last run left there: of each pixel the mean squared error of what came

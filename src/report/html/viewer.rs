@@ -101,8 +101,8 @@ impl Viewer<'_> {
         (shots, missing.into_iter().map(|index| self.images[index].name.as_str()).collect())
     }
 
-    /// `None` for an image without pixels, or of another number than its size says, or of more than `left` characters. What is too long is not encoded as far as its length
-    /// is known before.
+    /// `None` for an image without pixels, or of another number than its size says, or of more than `left` characters.
+    /// What is too long is not encoded as far as its length is known before.
     fn shot(&self, index: usize, left: usize) -> Option<Shot<'_>> {
         let image = &self.images[index];
         let Picture { width, height, pixels } = image.picture;

@@ -1,6 +1,7 @@
 //! The list of lights, the table that chooses one in proportion to its power, and where there are many a tree over them. The table takes
-//! delta lights and the small bright parts of a sky's picture [`DELTA_WEIGHT`] times as often, those at infinity and the others at least [`LEAST_SHARE`] of the time each, the others
-//! beside a sky without directional lights at least [`LEAST_BESIDE_SKY`]. Beside suns alone, a sky of one colour is not chosen.
+//! delta lights and the small bright parts of a sky's picture [`DELTA_WEIGHT`] times as often, those at infinity and the others
+//! at least [`LEAST_SHARE`] of the time each, the others beside a sky without directional lights at least [`LEAST_BESIDE_SKY`]. Beside
+//! suns alone, a sky of one colour is not chosen.
 //!
 //! Power, by luminance, in watts up to a common factor: emissive triangle or sphere `pi * area * L` (L the mean over its texture
 //! times the mean opacity, twice that where both sides shine), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
@@ -328,9 +329,10 @@ fn leave_sky(scene: &Scene, lights: &[Light], weights: &mut [f64]) {
 /// a lamp hardly brighter than the sky, .039; with shares of .1 and .25 .00035, .00022, .00016, .039 and .00017, .00034, .00023, .025.
 const LEAST_SHARE: f64 = 0.25;
 
-/// Least share that lights in the scene get beside a sky without directional lights, most of which BSDF sampling finds as well. At 8 and 16 samples a pixel a
-/// share of .5 leaves .27 to .91 of the variance that .25 does in eleven scenes, and 1.00 and 1.08 of it where a lamp shines below the
-/// picture of a sky. Beside suns it leaves .8 in Sponza, 1.08 on grass and 1.3 to 1.5 on snow by day, where lamps hardly matter.
+/// Least share that lights in the scene get beside a sky without directional lights, most of which BSDF sampling finds as well. At 8 and
+/// 16 samples a pixel a share of .5 leaves .27 to .91 of the variance that .25 does in eleven scenes, and 1.00 and 1.08 of it where a
+/// lamp shines below the picture of a sky. Beside suns it leaves .8 in Sponza, 1.08 on grass and 1.3 to 1.5 on snow by day, where lamps
+/// hardly matter.
 const LEAST_BESIDE_SKY: f64 = 0.5;
 
 /// Lights at infinity have the power that falls on the whole scene, which grows with ground that nobody looks at, while a lamp matters
