@@ -60,9 +60,13 @@ const KEYS: [Key; 41] = [
 /// A warning about the keys of a table that its type does not read.
 pub fn warning(t: &MaterialTable) -> Option<String> {
     let unread = |(name, is_set, types): &Key| (is_set(t) && !types.contains(&t.kind)).then_some(*name);
-    let unread: Vec<_> = KEYS.iter().filter_map(unread).collect();
-    let what = || format!("a {} material does not read {}", name(t.kind), unread.join(", "));
-    (!unread.is_empty()).then(|| format!("material \"{}\": {}", t.name, what()))
+    told(&format!("material \"{}\": a {} material", t.name, name(t.kind)), KEYS.iter().filter_map(unread))
+}
+
+/// A warning that `what` does not read some keys, if there are any.
+pub fn told<'a>(what: &str, unread: impl Iterator<Item = &'a str>) -> Option<String> {
+    let unread: Vec<_> = unread.collect();
+    (!unread.is_empty()).then(|| format!("{what} does not read {}", unread.join(", ")))
 }
 
 /// The name of a type in scene files.

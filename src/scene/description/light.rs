@@ -1,4 +1,5 @@
 //! The `[[light]]` tables.
+use super::keys::told;
 use super::value::Rgb;
 use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, NONE};
 use crate::scene::{MAX_COORDINATE, MAX_RADIANCE};
@@ -89,13 +90,12 @@ impl LightTable {
             ("cutoff", self.cutoff.is_some(), &[Spot]),
         ];
         let unread = keys.iter().filter(|(_, is_set, types)| *is_set && !types.contains(&self.kind));
-        let unread: Vec<_> = unread.map(|(name, ..)| *name).collect();
         let kind = match self.kind {
             Point => "point",
             Spot => "spot",
             Directional => "directional",
         };
-        (!unread.is_empty()).then(|| format!("light {number}: a {kind} light does not read {}", unread.join(", ")))
+        told(&format!("light {number}: a {kind} light"), unread.map(|(name, ..)| *name))
     }
 
     /// Unit direction in which the light travels.

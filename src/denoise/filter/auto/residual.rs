@@ -73,7 +73,8 @@ impl Window {
         if off > noise { residual * (1.0 - noise / off) } else { Vec3::ZERO }
     }
 
-    /// One pixel, if it is darker than its blend no less noisy than like pixels around: see `doubted` of the kernel.
+    /// The window of one pixel. If that is darker than its blend, it counts as no less noisy than like pixels around: see `doubted` of the
+    /// kernel.
     fn doubted(self, given: Vec3, wide: &Self) -> Self {
         let darker = contrast(self.residual / self.weights.max(1e-20), given) < 0.0;
         let around = self.samples * wide.variance / wide.samples.max(1e-20);
@@ -154,11 +155,12 @@ fn restored(
     if p.count == 0.0 || !own.filtered {
         return own.blended.max(least);
     }
-    let used = if own.measured { 3 } else { 1 };
-    let given =
-        windows[..used.min(2)].iter().fold(Vec3::ZERO, |given, window| given + window.significant(given, prior));
-    let alone = windows[2].doubted(given, &windows[0]);
-    let given = if used == 3 { given + alone.significant(given, prior) } else { given };
+    let [wide, near, alone] = windows;
+    let mut given = wide.significant(Vec3::ZERO, prior);
+    if own.measured {
+        given += near.significant(given, prior);
+        given += alone.doubted(given, &wide).significant(given, prior);
+    }
     let light = (own.blended + given).max(least);
     if own.blurred { light } else { edge.light(light, p.colour, own.noise) }
 }
