@@ -18,6 +18,15 @@ layout(constant_id = 114) const bool LAST = false;
 layout(constant_id = 115) const bool TWO = false;
 const int IMAGES = TWO ? 2 : 1;
 const float LEAST_DEVIATION = 1e-30; // stands for 0, so that equal pixels are alike where nothing varies
+// Departure: above this number of samples noise is little beside what neighbours truly differ by, and the weight narrows with their
+// fourth root. Over 14 scenes the filter alone has .96 of the relMSE at 16 samples, .86 at 64, and .99 and .92 of FLIP. `auto`, which
+// weighs what it makes of the image against other candidates, would have 1.05 of the relMSE at 64.
+const float FEW = 8.0;
+layout(constant_id = 116) const bool NARROWS = true;
+const float STEEPEST = 1e8; // weight per standard deviation, finite over LEAST_DEVIATION
+
+// How much narrower the weight of luminance is at so many samples.
+float narrowed(float count) { return NARROWS ? sqrt(sqrt(max(count / FEW, 1.0))) : 1.0; }
 
 int index(ivec2 at) {
     return at.y * int(push.size.x) + at.x;
@@ -65,11 +74,12 @@ void main() {
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         ivec2 at = nearest(ivec2(x, first + k * spacing));
         pixel[k] = unpack_pixel(vec4(0.0), texelFetch(place, index(at)));
+        float rate_l = min(push.rate_l * narrowed(texelFetch(colour, index(at)).w), STEEPEST);
         [[unroll]] for (int m = 0; m < IMAGES; m++) {
             vec4 here = fetch(m, index(at));
             centre[m][k] = here;
             // An unknown pixel has no luminance to compare.
-            rate[m][k] = here.w >= 0.0 ? push.rate_l / (deviation(m, at) + LEAST_DEVIATION) : 0.0;
+            rate[m][k] = here.w >= 0.0 ? rate_l / (deviation(m, at) + LEAST_DEVIATION) : 0.0;
             sum[m][k] = vec3(0.0);
             total[m][k] = 0.0;
             spread[m][k] = 0.0;

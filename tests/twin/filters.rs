@@ -369,6 +369,8 @@ fn svgf_counts_in_deviations() {
         (4.0, [1.0; 3], 1.0),
         (4.0, [1e-6; 3], 1e3),
         (2.0, [1.0; 3], 1.0),
+        (8.0, [1.0; 3], 1.0),
+        (128.0, [1.0; 3], 2.0), // of 16 times as many the fourth root
         (1.0, [1.0; 3], spread),
         (4.0, [1.0, f32::NAN, 1.0], spread),
         (4.0, [1.0, f32::INFINITY, 1.0], spread),
@@ -383,6 +385,8 @@ fn svgf_counts_in_deviations() {
         let settings = plain.with(|s| s.svgf.sigma_l = sigma_l);
         let found = both(&gpu, "svgf", &pair(step, 4.0, [0.0; 3]), &settings)[0][0];
         assert!((found - left).abs() < 1e-6, "sigma {sigma_l}: {found}");
+        let of_many = red(&both(&gpu, "svgf", &pair([[1.0; 3]; 2], 1e7, [0.0; 3]), &settings));
+        assert_eq!(of_many, [1.0; 2], "sigma {sigma_l}");
         // Red and blue of one luminance, 0.2126 to the last bit, are no step at all.
         let alike = [[1.0, 0.0, 0.0], [0.0, 0.0, 2.944_598_2]];
         let red = red(&both(&gpu, "svgf", &pair(alike, 4.0, [0.0; 3]), &settings));

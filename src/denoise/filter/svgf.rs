@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec4};
 use crate::settings::{FROM_0, settings};
-use crate::shaders::svgf::{Bind, Constants, LEAST_DEVIATION};
+use crate::shaders::svgf::{Bind, Constants, FEW, LEAST_DEVIATION, STEEPEST};
 use crate::threads::each;
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
@@ -30,7 +30,7 @@ settings! {
     pub struct SvgfSettings {
         /// What is given of them.
         SvgfOverrides {
-            /// Standard deviations of a pixel's luminance that count as an edge.
+            /// Standard deviations of a pixel's luminance that count as an edge; `svgf` takes (8 / n)^(1/4) of it for n > 8 samples.
             sigma_l: f32 = 4.0, FROM_0;
         }
     }
@@ -55,14 +55,14 @@ pub struct Levels {
 }
 
 impl SvgfSettings {
-    /// Per standard deviation, in base 2; finite also over a deviation of [`LEAST_DEVIATION`].
+    /// Per standard deviation, in base 2.
     fn rate_l(&self) -> f32 {
-        (LOG2_E / self.sigma_l).min(1e8)
+        (LOG2_E / self.sigma_l).min(STEEPEST)
     }
 }
 
 impl Levels {
-    /// For images of (width, height), one or two of which are filtered together.
+    /// For images of (width, height): one, whose weights narrow with the number of samples, or `two` that are filtered together.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
@@ -76,7 +76,7 @@ impl Levels {
     ) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
         let (edge, local_size_x) = (rates.constants(), gpu.tuning().filter_workgroup);
-        let kernel = |last| Kernel::new(gpu, &Constants { edge, local_size_x, last, two });
+        let kernel = |last| Kernel::new(gpu, &Constants { edge, local_size_x, last, two, narrows: !two });
         let pixels = width as usize * height as usize;
         let scratch = |pixels| Buffer::new(gpu, "svgf", pixels, Location::Device);
         Ok(Self {
@@ -148,25 +148,27 @@ struct Level<'a> {
     spacing: i64,
     rates: Rates,
     rate_l: f32,
+    narrows: bool,
 }
 
 fn reference(input: &FilterInput, edge: &EdgeSettings, own: &SvgfSettings, levels: u32) -> Vec<vec4> {
     let image = Packed::reference(input);
     let noise = noise_estimate::reference(input, &image, edge, false);
-    filtered([input.width, input.height], image.into_iter().zip(noise).collect(), edge, own, levels)
+    filtered([input.width, input.height], image.into_iter().zip(noise).collect(), edge, own, levels, true)
 }
 
-/// The levels on an image whose noise is known.
+/// The levels on an image whose noise is known; `narrows` says whether weights do with the number of samples.
 pub fn filtered(
     size: [u32; 2],
     mut image: Vec<Noisy>,
     edge: &EdgeSettings,
     own: &SvgfSettings,
     levels: u32,
+    narrows: bool,
 ) -> Vec<vec4> {
     let (size, rates, rate_l) = (size.map(i64::from), Rates::of_surfaces(edge), own.rate_l());
     for level in 0..levels {
-        let filter = Level { image: &image, size, spacing: 1 << level, rates, rate_l };
+        let filter = Level { image: &image, size, spacing: 1 << level, rates, rate_l, narrows };
         image = (0..image.len()).map(|at| filter.filtered(at)).collect();
     }
     image.iter().map(|(pixel, _)| pixel.output()).collect()
@@ -186,7 +188,8 @@ impl Level<'_> {
         let (total, sum) = near
             .filter(|((_, variance), _)| *variance >= 0.0)
             .fold((0.0, 0.0), |(total, sum), ((_, variance), w)| (total + w, sum + w * variance));
-        self.rate_l / (f32::sqrt(sum / total) + LEAST_DEVIATION)
+        let narrowed = if self.narrows { (self.image[at].0.count / FEW).max(1.0).sqrt().sqrt() } else { 1.0 };
+        (self.rate_l * narrowed).min(STEEPEST) / (f32::sqrt(sum / total) + LEAST_DEVIATION)
     }
 
     fn filtered(&self, at: usize) -> Noisy {

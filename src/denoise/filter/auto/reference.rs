@@ -58,8 +58,14 @@ impl Results {
         let (size, s) = ([input.width, input.height], &rows[3]);
         let svgf = |added: &dyn Fn(usize) -> f32| -> Vec<Vec4> {
             let pixel = |i: usize| (Packed { colour: image[i].colour + added(i), ..image[i] }, noise[i]);
-            let output =
-                svgf::filtered(size, (0..image.len()).map(pixel).collect(), &s.edge, &s.svgf, s.footprint.levels);
+            let output = svgf::filtered(
+                size,
+                (0..image.len()).map(pixel).collect(),
+                &s.edge,
+                &s.svgf,
+                s.footprint.levels,
+                false,
+            );
             output.into_iter().map(Vec4::from).collect()
         };
         let (svgf, probed) = (svgf(&|_| 0.0), svgf(&added));
