@@ -22,7 +22,8 @@ impl Pixel {
     }
 }
 
-/// Samples that were NaN or infinite and were counted as black.
+/// Samples that are wrong: NaN or infinite, which count as black, or of paths that llvmpipe ended before their time
+/// (`glsl/shared/loop_limit.glsl`), which count as far as they came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BrokenSamples {
     /// Number of such samples.

@@ -272,6 +272,7 @@ Hit deal_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, b
             follow(w, shadowed, ray, second, alive, root);
         }
     } while (any_lane(w.on));
+    ended_early = ended_early || w.on;
     return w.t.hit;
 }
 

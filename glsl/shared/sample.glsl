@@ -1,6 +1,6 @@
 // What a path leaves behind: one vec4 (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). With
 // FX_SOFT what lamps and sky bring to the first hit goes with indirect light, since it is as noisy. w of the first is the number of
-// rays, negated where the light was not finite: such a sample is black.
+// rays, negated where the light was not finite, such a sample is black, or where the path `ended_early`.
 #include "shared/finite.glsl"
 #include "shared/path_state.glsl"
 #include "shared/counters.glsl"
@@ -8,11 +8,12 @@
 layout(scalar, binding = 11) writeonly buffer Samples { u64vec2 samples[]; }; // of vec4
 layout(scalar, binding = 14) buffer Broken { BrokenTally broken[]; };
 
-void store_sample(uint i, uint pixel, PathState p) {
+void store_sample(uint i, uint pixel, PathState p, bool ended_early) {
     SplitLight light = light_of(p);
     float rays = float(p.closest_rays + p.any_rays);
-    if (!finite(light.direct + light.indirect)) {
-        light = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
+    bool known = finite(light.direct + light.indirect);
+    if (!known) light = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
+    if (!known || ended_early) {
         rays = -rays;
         atomicMax(broken[0].lowest, ~pixel);
     }

@@ -11,6 +11,7 @@ Hit traverse(Segment ray, uint root) {
     do {
         done = traversal_step(t, space, false, root, ray.mask_seed, uvec2(NONE));
     } while (!done);
+    ended_early = ended_early || !done;
     return t.hit;
 }
 
@@ -32,6 +33,7 @@ Hit trace_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, 
             done = !alive;
         }
     } while (!done);
+    ended_early = ended_early || !done;
     return t.hit;
 }
 #endif

@@ -1,5 +1,5 @@
-// Closest hit and any hit of a ray through eight-way compressed nodes (Ylitie, Karras, Laine, HPG 2017), as obvhs builds them,
-// with a watertight triangle test. Kernels call what trace.glsl makes of it.
+// Closest hit and any hit of a ray through eight-way compressed nodes (Ylitie, Karras, Laine, HPG 2017), as
+// scene/build/bvh builds them, with a watertight triangle test. Kernels call what trace.glsl makes of it.
 //
 // The code is shaped for lavapipe, which executes all of it under masks for every node: few instructions and few variables that
 // live from step to step count for more than early exits. A loop that tests at its head would run its body once more with no
@@ -9,6 +9,8 @@
 #include "shared/texture.glsl"
 
 uint nodes_visited = 0u; // by this thread
+// Whether a search of this thread was left before its end, as llvmpipe does after many turns: see shared/loop_limit.glsl.
+bool ended_early = false;
 
 // Number of groups that a ray of this scene can leave on its stack (scene/build/bvh.rs). Two stay in registers. lavapipe writes
 // to an array lane by lane, with a branch each, so that an unconditional write, useless where no group is left, costs less.

@@ -25,6 +25,6 @@ void main() {
     else p.hit = traverse(next_segment(p), push.constants.root);
     trace_path(p, on, random);
     if (!on) return;
-    store_sample(i, pixel, p);
+    store_sample(i, pixel, p, ended_early);
     if (FX_COUNTERS) count_up(2u, nodes_visited);
 }

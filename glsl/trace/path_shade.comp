@@ -28,6 +28,6 @@ void main() {
         save_path(i, p, d);
         wait_for_rays(i);
     } else {
-        store_sample(i, pixel, p);
+        store_sample(i, pixel, p, false);
     }
 }

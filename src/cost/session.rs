@@ -76,7 +76,10 @@ impl<'a> Session<'a> {
         };
         let Some(Warm { renderer, .. }) = &self.warm[shot] else { return Ok(None) };
         if let Some(broken) = status.broken_samples {
-            return Err(Error::Device(format!("{} samples were no number", broken.count)));
+            return Err(Error::Device(format!(
+                "{} samples were no number, or stopped early by the driver",
+                broken.count
+            )));
         }
         let [rays, of] = Job::new(renderer).rays_of_a_few(&status)?;
         let passes = passes(&status.times);

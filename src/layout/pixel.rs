@@ -47,7 +47,7 @@ gpu_structs! {
         remainder: uint,
     }
 
-    /// Samples that were not finite and counted as black.
+    /// Samples that were not finite and counted as black, or whose path ended before its time: see `glsl/shared/sample.glsl`.
     struct BrokenTally {
         /// Number of such samples, up to about 2^31.
         count: uint,

@@ -246,7 +246,7 @@ fn light(film: &Film) -> std::result::Result<Option<Light<'_>>, String> {
     Ok(Some((rgb(film, "direct")?, rgb(film, "albedo")?, m2)))
 }
 
-/// What the file says of samples that were no number.
+/// What the file says of samples that were no number or ended early.
 ///
 /// # Errors
 /// When it is damaged.

@@ -68,7 +68,7 @@ pub struct Status {
     pub allocations: u32,
     /// Most priorities of one allocation that were not finite, and so counted for nothing.
     pub broken_priorities: u32,
-    /// Samples that were no number, those before the checkpoint included; found once the job has ended.
+    /// Samples that were no number or ended early, those before the checkpoint included; found once the job has ended.
     pub broken_samples: Option<BrokenSamples>,
     /// Why it ended; while it goes on, [`StopReason::Interrupted`], as if it stopped here.
     pub stopped: StopReason,

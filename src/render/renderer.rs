@@ -341,8 +341,8 @@ impl Renderer {
         ]
     }
 
-    /// Samples since [`Step::Start`] that were no number, and counted as black: a fault of the renderer, or of a scene whose
-    /// numbers are too large.
+    /// Samples since [`Step::Start`] that are wrong: those that were no number, a fault of the renderer, or of a scene whose numbers
+    /// are too large, and those of paths whose rays had to search for too long for llvmpipe.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].

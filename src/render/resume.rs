@@ -25,7 +25,7 @@ pub struct Checkpoint {
     pub pending: Vec<u32>,
     /// Allocations that it had made.
     pub allocations: u32,
-    /// Its samples that were no number.
+    /// Its samples that were no number or ended early.
     pub broken: Option<BrokenSamples>,
     /// Whether its pixels tell direct and indirect light apart.
     pub splits_light: bool,

@@ -2,6 +2,8 @@
 //! give the known answer of furnaces, and have no broken pixel.
 use crate::alike::alike;
 use crate::support;
+use crate::twin::{Random, Workplace};
+use glam::Vec3;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Mutex;
@@ -572,6 +574,36 @@ fn samples_that_are_no_numbers_are_black_and_told() {
         // Whatever is in the film before, a start forgets it.
         renderer.run(&mut frame, &Step::Start).unwrap();
         assert_eq!(renderer.broken_samples().unwrap(), None);
+    }
+    support::assert_silent(&gpu);
+}
+
+/// So many triangles, each from one face of a cube to the opposite one and as thin as a hair: boxes around them tell rays little.
+fn hair(count: usize) -> Loaded {
+    let strand = |i: usize| {
+        let mut random = Random::stream(i);
+        let (mut root, mut tip) = (random.point(), random.point());
+        (root[i % 3], tip[i % 3]) = (-1.0, 1.0);
+        [root, root + 4e-4 * Vec3::AXES[(i + 1) % 3], tip]
+    };
+    Workplace::new().obj("hair.obj", &(0..count).map(strand).collect::<Vec<_>>()).scene(
+        "[camera]\nposition = [0, 1.2, 4]\ntarget = [0, 0, 0]\nfov = 35\n[film]\nwidth = 8\nheight = 8\n\
+         [render]\nspp = 1\nmax_depth = 4\n[environment]\nradiance = 1\n[[mesh]]\nfile = 'hair.obj'\nflat = true\n",
+    )
+}
+
+/// llvmpipe ends the loops of paths whose rays meet tens of thousands of boxes and triangles: their light is too little then.
+#[test]
+fn paths_that_a_driver_ends_early_are_told() {
+    let gpu = support::gpu();
+    for (count, ends) in [(2_000, false), (150_000, true)] {
+        let scene = hair(count);
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+        Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
+        let (stats, broken) = (support::stats(&renderer), renderer.broken_samples().unwrap());
+        assert_eq!(broken.is_some_and(|broken| broken.count > 0), ends, "{count}: {broken:?}");
+        assert!(stats.iter().all(|s| s.count == 1 && s.mean.iter().all(|v| v.is_finite())), "{count}");
+        assert!(stats.iter().any(|s| s.mean[0] > 0.0), "what was found until then counts");
     }
     support::assert_silent(&gpu);
 }

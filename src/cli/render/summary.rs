@@ -28,7 +28,7 @@ pub struct Summary {
     pub stopped: StopReason,
     /// Most priorities of one allocation that were not finite.
     pub broken_priorities: u32,
-    /// Samples that were no number and counted as black, those of a resumed file included.
+    /// Samples that were no number and counted as black, or ended early, those of a resumed file included.
     pub broken_samples: Option<BrokenSamples>,
     /// What was planned, where it was.
     pub plan: Option<Plan>,

@@ -196,11 +196,11 @@ impl Taken<'_> {
     }
 }
 
-/// Always told: it is a bug, or light too strong for the numbers.
+/// Always told: it is a bug, light too strong for the numbers, or too much work for a path on llvmpipe.
 fn warn_of_broken(broken: &BrokenSamples) {
     let BrokenSamples { count, pixel: [x, y], sample, seed } = broken;
     complain(&format!(
-        "warning: samples that were no number and count as black: {count}; the first: pixel ({x}, {y}), sample {sample}, \
-         seed {seed}"
+        "warning: wrong samples: {count}, which were no number and count as black, or whose rays meet so much that the \
+         driver stopped them early; the first: pixel ({x}, {y}), sample {sample}, seed {seed}"
     ));
 }
