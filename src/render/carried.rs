@@ -1,4 +1,5 @@
 //! The history of a frame in its film, by which a later run goes on as if it had never stopped.
+use super::rendered::check_values;
 use super::{Renderer, Step, film};
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
@@ -39,10 +40,12 @@ impl Renderer {
     }
 
     /// Puts back the end of a frame, out of its film with what [`Self::add_history`] added: a [`Step::Reproject`] that follows carries the
-    /// samples on, to the same bits. `scene` is in the frame's pose, and the renderer was told of it.
+    /// samples on, to the same bits where the renderer has the frame's seed and first sample. `scene` is in the frame's pose, and the
+    /// renderer was told of it.
     ///
     /// # Errors
-    /// [`Error::Usage`] without a history, and for a film of another size or without a layer; [`Error::Device`].
+    /// [`Error::Usage`] without a history, and for a film of another size, without a layer or with values that no samples have;
+    /// [`Error::Device`].
     pub fn take_up(&self, frame: &mut FrameResources, film: &Film, scene: &Scene) -> Result<()> {
         let history = self.frame.history()?;
         let (wanted, found) = ([self.settings.width, self.settings.height], [film.width, film.height]);
@@ -52,6 +55,7 @@ impl Renderer {
         let lacks = |what: String| Error::Usage(format!("the frame before {what}"));
         self.check_split(film::splits_light(film).map_err(lacks)?)?;
         let pixels = film::pixels(film).map_err(lacks)?;
+        check_values(&pixels, film.width).map_err(lacks)?;
         let [samples, age] = [SAMPLES, AGE].map(|name| film::counts(film, name).map_err(lacks));
         let (samples, age) = (samples?, age?);
         // Numbers of a damaged file stay within their bits.

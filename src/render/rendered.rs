@@ -40,7 +40,7 @@ pub(crate) struct Rendered {
     pub settings: Settings,
     /// Row-major. Every value is finite, M2 is not negative, and no pixel has more samples than the ranges.
     pub pixels: Vec<Pixel>,
-    /// Samples that were no number.
+    /// Samples that were no number or ended early.
     pub broken: Option<BrokenSamples>,
     /// Samples that each pixel still lacks: of a file that was interrupted.
     pub pending: Option<Vec<u32>>,
@@ -94,16 +94,25 @@ fn check_size(film: &Film, settings: &Settings) -> Result<(), String> {
 
 fn check_pixels(pixels: &[Pixel], width: u32, most: u32) -> Result<(), String> {
     for (i, pixel) in pixels.iter().enumerate() {
-        let at = || format!("pixel ({}, {})", i as u32 % width, i as u32 / width);
         let count = pixel.stats.count;
         if count > most {
-            return Err(format!("{} has {count} samples, but the file tells of {most} at most", at()));
-        }
-        if let Some((layer, value)) = broken(pixel) {
-            return Err(format!("{} has {value} in the layer {layer}: no samples can be added to that", at()));
+            let (x, y) = (i as u32 % width, i as u32 / width);
+            return Err(format!("pixel ({x}, {y}) has {count} samples, but the file tells of {most} at most"));
         }
     }
-    Ok(())
+    check_values(pixels, width)
+}
+
+/// Checks that all values are such as samples have.
+///
+/// # Errors
+/// A predicate that names the first pixel.
+pub(super) fn check_values(pixels: &[Pixel], width: u32) -> Result<(), String> {
+    let found = pixels.iter().enumerate().find_map(|(i, pixel)| Some((i as u32, broken(pixel)?)));
+    found.map_or(Ok(()), |(i, (layer, value))| {
+        let (x, y) = (i % width, i / width);
+        Err(format!("has {value} in the layer {layer} of pixel ({x}, {y}): no samples can be added to that"))
+    })
 }
 
 /// A value that no samples have, and its layer.
