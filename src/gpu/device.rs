@@ -96,7 +96,7 @@ impl Gpu {
     /// missing, ray queries or the validation layers are asked for and not there. [`Error::Usage`] for a tuning that cannot be.
     pub fn open(options: &DeviceOptions) -> Result<Self> {
         let instance = Instance::new(options.validation)?;
-        let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
+        let candidate = choose(info::candidates(&instance.raw)?, options)?;
         let queue_family = usable(&candidate)?;
         let by_ray_query = is_by_ray_query(options.tracing, &candidate.info)?;
         let tuning = options.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).on(candidate.info.kind)?;
@@ -159,13 +159,16 @@ impl Gpu {
         &self.0.info
     }
 
-    /// Checks that the device tells times.
+    /// Checks that the queue's family tells times.
     ///
     /// # Errors
     /// [`Error::Device`].
     pub fn check_clock(&self) -> Result<()> {
         match self.0.info.timestamp_bits {
-            0 => Err(Error::Device(format!("{} has no timestamps: choose another device", self.0.info.name))),
+            0 => Err(Error::Device(format!(
+                "{} has no timestamps: choose another device or queue family",
+                self.0.info.name
+            ))),
             _ => Ok(()),
         }
     }
@@ -334,11 +337,18 @@ impl Drop for Inner {
     }
 }
 
-/// Chooses a device by index or name, or the best one. `candidates` must not be empty.
-fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate> {
-    let best =
-        || (0..candidates.len()).min_by_key(|&i| (!candidates[i].info.missing.is_empty(), candidates[i].info.kind));
-    let index = wanted.map_or_else(best, |wanted| find(&candidates, wanted)).ok_or_else(|| {
+/// Chooses a device by index, or the best one, of those that a name is part of if there is one. `candidates` must not be empty.
+fn choose(mut candidates: Vec<Candidate>, options: &DeviceOptions) -> Result<Candidate> {
+    let wanted = options.device.as_deref();
+    let lacks = |info: &DeviceInfo| match (info.missing.is_empty(), options.tracing) {
+        (false, _) => 2,
+        (true, Tracing::RayQuery) if !info.ray_query_lacks.is_empty() => 1,
+        (true, _) => 0,
+    };
+    let rank = |i: &usize| (lacks(&candidates[*i].info), candidates[*i].info.kind);
+    let best = || (0..candidates.len()).min_by_key(rank);
+    let named = |wanted| find(&candidates, wanted).into_iter().min_by_key(rank);
+    let index = wanted.map_or_else(best, named).ok_or_else(|| {
         let list = candidates.iter().enumerate().map(|(i, c)| format!("{i}: {}", c.info.name)).collect::<Vec<_>>();
         let (wanted, list) = (wanted.unwrap_or_default(), list.join("; "));
         Error::Device(format!("no device is called \"{wanted}\": choose one of {list}"))
@@ -349,15 +359,17 @@ fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candid
 /// Numbers below this are indices and no parts of names: a "1" is in the version of many a driver that a name ends in.
 const INDICES: usize = 100;
 
-fn find(candidates: &[Candidate], wanted: &str) -> Option<usize> {
+/// Those that are meant.
+fn find(candidates: &[Candidate], wanted: &str) -> Vec<usize> {
     if let Some(index) = wanted.parse().ok().filter(|&index: &usize| index < INDICES) {
-        return Some(index).filter(|&index| index < candidates.len());
+        return Some(index).filter(|&index| index < candidates.len()).into_iter().collect();
     }
     let wanted = wanted.to_lowercase();
     if wanted.trim().is_empty() {
-        return None; // it would be a part of every name
+        return Vec::new(); // it would be a part of every name
     }
-    candidates.iter().position(|c| c.info.name.to_lowercase().contains(&wanted))
+    let is_meant = |i: &usize| candidates[*i].info.name.to_lowercase().contains(&wanted);
+    (0..candidates.len()).filter(is_meant).collect()
 }
 
 /// Returns the queue family if the device has all required features.
@@ -421,4 +433,72 @@ fn create_device(
     }
     // SAFETY: `physical` was found to have the features and extensions; `info` lives through the call.
     unsafe { instance.create_device(physical, &info, None) }.at("opening the device")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(
+        name: &str,
+        kind: DeviceKind,
+        missing: &[&'static str],
+        ray_query_lacks: &[&'static str],
+    ) -> Candidate {
+        let text = String::new;
+        let info = DeviceInfo {
+            name: name.into(),
+            kind,
+            vendor_id: 0,
+            device_id: 0,
+            unified: false,
+            driver_name: text(),
+            driver_info: text(),
+            driver_version: text(),
+            api_version: text(),
+            max_storage_range: 0,
+            max_texel_elements: 0,
+            max_buffer_size: 0,
+            max_allocation: 0,
+            memory_heap: 0,
+            subgroup_size: 0,
+            subgroup_size_fixed: false,
+            subgroup_shuffle: false,
+            timestamp_bits: 0,
+            timestamp_period: 0.0,
+            robust_buffer_access: false,
+            missing: missing.to_vec(),
+            ray_query_lacks: ray_query_lacks.to_vec(),
+        };
+        let (physical, limits, cache_uuid) = Default::default();
+        Candidate { physical, info, limits, cache_uuid, queue_family: Some(0) }
+    }
+
+    #[test]
+    fn the_best_of_the_devices_that_are_meant_and_lack_nothing_is_chosen() {
+        let all = || {
+            vec![
+                candidate("Card 1 (old driver)", DeviceKind::DiscreteGpu, &["maintenance4"], &["VK_KHR_ray_query"]),
+                candidate("Card 1 (new driver)", DeviceKind::DiscreteGpu, &[], &["VK_KHR_ray_query"]),
+                candidate("Chip", DeviceKind::IntegratedGpu, &[], &[]),
+                candidate("llvmpipe", DeviceKind::Cpu, &[], &["VK_KHR_ray_query"]),
+            ]
+        };
+        for (device, tracing, expected) in [
+            (None, Tracing::Auto, "Card 1 (new driver)"),
+            (None, Tracing::RayQuery, "Chip"),
+            (Some("card 1"), Tracing::Auto, "Card 1 (new driver)"),
+            (Some("card 1"), Tracing::RayQuery, "Card 1 (new driver)"),
+            (Some("0"), Tracing::Auto, "Card 1 (old driver)"),
+            (Some("pipe"), Tracing::RayQuery, "llvmpipe"),
+        ] {
+            let options = DeviceOptions { device: device.map(Into::into), tracing, ..Default::default() };
+            assert_eq!(choose(all(), &options).unwrap().info.name, expected, "{device:?}, {tracing:?}");
+        }
+        for unknown in ["4", "chips", " "] {
+            let options = DeviceOptions { device: Some(unknown.into()), ..Default::default() };
+            let said = choose(all(), &options).err().unwrap().to_string();
+            assert!(said.contains("no device is called") && said.contains("2: Chip"), "{said}");
+        }
+    }
 }
