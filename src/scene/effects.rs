@@ -102,7 +102,11 @@ impl Found {
 
     fn by_geometry(&mut self, scene: &Scene) {
         let object_of = |triangle: usize| {
-            let object = scene.triangles.get(triangle).map(|t| t.object as usize);
+            // Below instances objects are counted from those of the first that places the mesh.
+            let tree = scene.rig.trees.iter().find(|tree| tree.range.contains(&triangle));
+            let places = |i: &&Instance| tree.is_some_and(|tree| i.root as usize == tree.nodes.start);
+            let first = scene.instances.iter().find(places).map_or(0, |instance| instance.object);
+            let object = scene.triangles.get(triangle).map(|t| (first + t.object) as usize);
             format!("object \"{}\"", object.and_then(|o| scene.names.objects.get(o)).map_or("", |name| name))
         };
         let shaded = |like: &dyn Fn(&Shading) -> bool| scene.shading.iter().position(like).map(object_of);
@@ -209,6 +213,17 @@ fn light_name(scene: &Scene, index: usize) -> String {
 mod tests {
     use super::*;
     use crate::scene::load::material::Materials;
+
+    #[test]
+    fn what_an_instance_places_is_named() {
+        let text = "[camera]\nposition = [0, 0, 6]\ntarget = [0, 0, 0]\n[environment]\nradiance = 1\n\
+                    [[mesh]]\nshape = 'rectangle'\nname = 'floor'\n\
+                    [[mesh]]\nshape = 'sphere'\nname = 'ball'\nmoving = true\n";
+        let loaded = Scene::parse(std::path::Path::new("ball.toml"), text).unwrap();
+        let (_, reasons) = effects(&loaded, &loaded.settings, false, false);
+        let by = |wanted| reasons.iter().find(|(effect, _)| *effect == wanted).map(|(_, by)| by.as_str());
+        assert_eq!(by(Effect::spheres), Some("object \"ball\""));
+    }
 
     #[test]
     fn only_what_is_worn_calls() {
