@@ -57,12 +57,13 @@ impl Gpu {
     /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled, and with what [`RawDevice::tracing`] takes.
     /// - Whoever creates or destroys an instance or a device on another thread while this runs, or, with [`RawDevice::debug_utils`], as
     ///   long as the returned `Gpu` is used, holds [`super::change_loader_lists`].
-    /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do, or what calls these:
-    ///   [`Renderer::new`](crate::render::Renderer::new), `specialised` and `resumable`, [`Denoiser::new`](crate::denoise::Denoiser::new),
-    ///   [`Filtered`](crate::denoise::Filtered), [`filter::run`](crate::denoise::filter::run), and all that
-    ///   [`Recorder::external`](super::Recorder::external) lists. Recording uses no queue: neither `record`, `update` and `steps_on` of a
-    ///   renderer nor a denoiser's `record`. With a queue of its own, where the family has several, there is nothing to
-    ///   lock; frames may still be submitted to any queue of the family.
+    /// - Nobody else uses the queue while anything of this crate may. Only recording never does: `record`, `update`, `steps`, `steps_on`,
+    ///   `views` and what begins with `set_` of a [`Renderer`](crate::render::Renderer), `record` and `radiance` of a
+    ///   [`Denoiser`](crate::denoise::Denoiser) and of filters, [`super::FrameResources::new`] and [`super::Buffer::new`]. All else that
+    ///   takes this `Gpu`, or what was made of it, may submit to the queue and wait for it: what makes renderers, denoisers, filters,
+    ///   [`Planes`](crate::denoise::filter::Planes) and filled buffers, what reads or writes buffers, [`Gpu::run`], and all of
+    ///   [`profile`](crate::profile). With a queue of its own, where the family has several, there is nothing to lock; frames may
+    ///   still be submitted to any queue of the family.
     /// - Without `robust_buffer_access`, kernels read only what a [`Renderer`](crate::render::Renderer), a
     ///   [`Denoiser`](crate::denoise::Denoiser) and [`filter::run`](crate::denoise::filter::run) give them, which is checked:
     ///   none of their [`super::Buffer`]s is written by others, no pass, policy or filter is recorded apart from them,

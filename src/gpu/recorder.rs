@@ -52,13 +52,15 @@ impl<'a> Recorder<'a> {
 
     /// Records into the caller's `VkCommandBuffer`, given as the number that it is in Vulkan's C interface. The passes see
     /// what the caller recorded or submitted before. Once this recorder is dropped, what they write is visible to everything
-    /// that follows and to the host. The bound compute pipeline, descriptor set 0 and push constants are changed.
+    /// that follows and to the host. What is bound for compute does not outlast it: the pipeline, all descriptor sets, and the push
+    /// constants of all stages. Bind anew what your next dispatch takes.
     ///
     /// # Safety
     /// - The command buffer was made for the device and queue family of `gpu`, is recording outside a render pass, and
     ///   nobody else records into it until the recorder is dropped.
     /// - It is submitted at most once, to a queue of that device.
-    /// - `frame` is neither recorded into again nor dropped before that submission is complete.
+    /// - `frame` is neither recorded into again nor dropped before that submission is complete: a command buffer with a pass of yours
+    ///   between two recordings takes two frames.
     /// - No buffer that it uses is read or written from the submission until it is complete: by [`Buffer::read`],
     ///   [`Buffer::read_range`] or [`Buffer::write`], by [`Gpu::run`], by what calls any of these, or by another such submission,
     ///   unless that goes to the same queue or a semaphore orders the two. What calls them is all that returns what the device has

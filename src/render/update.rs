@@ -33,7 +33,8 @@ impl Renderer {
     /// such as one that was loaded in another pose, and for one with another number of triangles, materials or textures or an
     /// environment of another size; [`Error::Scene`] where everything has changed, to what [`Scene::check`] refuses; [`Error::Device`].
     /// But for the last, nothing has changed in the renderer then; the scene keeps its pose. To go back, apply the pose before anew, and
-    /// update with both changes as one.
+    /// update with both changes as one. After [`Error::Device`], such as where memory has run out, record no step before an update with
+    /// [`Change::everything`] has succeeded: host and device do not agree until then.
     pub fn update(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
         self.check_parts(scene)?;
         if change.everything {

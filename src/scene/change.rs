@@ -4,7 +4,8 @@ use crate::error::{Error, Result};
 use crate::layout::{LIGHT_ENVIRONMENT, Light};
 use std::ops::Range;
 
-/// What [`Scene::apply`](super::Scene::apply) has changed, for those who copy it to a device.
+/// What [`Scene::apply`](super::Scene::apply) has changed, for those who copy it to a device. Every renderer of the scene takes every
+/// change, in order: what it was not told of stays as it was.
 #[derive(Clone, Debug, Default)]
 pub struct Change {
     /// All that a pose can change, whatever the device has of it: see [`Change::everything`].
