@@ -14,7 +14,8 @@ use ash::vk;
 use std::sync::Arc;
 
 /// Command buffer, descriptor sets and timestamps of one frame in flight. They grow to what a frame needs and are reused
-/// by every recording. The frame also keeps the buffers and kernels of the last recording alive.
+/// by every recording. The frame also keeps the buffers and kernels of the last recording alive, until its work is known to be
+/// complete: [`Gpu::run`] waits for it, of others [`Self::release`] tells.
 pub struct FrameResources {
     commands: Commands,
     pub(super) descriptors: Descriptors,
@@ -92,6 +93,22 @@ impl FrameResources {
         Ok(())
     }
 
+    /// Lets go of the buffers, kernels and structures of the last recording, and of the memory that its uploads went through, so that what
+    /// a dropped renderer or denoiser took is free before another is made. Times and passes stay, and so does what another recording
+    /// reuses. What was recorded with [`super::Recorder::external`] must be complete, as for another recording; [`Gpu::run`] lets go
+    /// of all but the memory of uploads by itself.
+    pub fn release(&mut self) {
+        self.let_go();
+        self.uploads = Uploads::default();
+    }
+
+    /// Forgets what the last recording uses, which is complete.
+    pub(super) fn let_go(&mut self) {
+        self.hazards.clear();
+        self.pipelines.clear();
+        self.structures.clear();
+    }
+
     pub(super) fn gpu(&self) -> &Gpu {
         self.timer.gpu()
     }
@@ -104,10 +121,8 @@ impl FrameResources {
     pub(super) fn reset(&mut self) -> Result<()> {
         self.gpu().0.answers()?;
         self.timer.reset();
-        self.hazards.clear();
+        self.let_go();
         self.uploads.reset();
-        self.pipelines.clear();
-        self.structures.clear();
         self.shapes.clear();
         self.descriptors.reset()
     }
@@ -123,14 +138,14 @@ impl FrameResources {
         self.commands.submit_and_wait(|| self.timer.written(), || self.timer.last_started())
     }
 
-    /// Keeps a kernel until the next reset.
+    /// Keeps a kernel until the work is complete.
     pub(super) fn keep(&mut self, kernel: &Compiled) {
         if !self.pipelines.iter().any(|kept| Arc::ptr_eq(kept, &kernel.pipeline)) {
             self.pipelines.push(kernel.pipeline.clone());
         }
     }
 
-    /// Keeps acceleration structures until the next reset.
+    /// Keeps acceleration structures until the work is complete.
     pub(super) fn keep_structures(&mut self, handles: &Arc<Handles>) {
         if !self.structures.iter().any(|kept| Arc::ptr_eq(kept, handles)) {
             self.structures.push(handles.clone());

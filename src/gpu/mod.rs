@@ -2,7 +2,7 @@
 //! Rust that names buffers and kernels. The one other foreign library is here for the same reason: [`Oidn`].
 //!
 //! The layer promises its callers:
-//! - A handle that a call uses is alive: a frame keeps the buffers and pipelines recorded into it until it is reset, and
+//! - A handle that a call uses is alive: a frame keeps the buffers and pipelines recorded into it until the work is complete, and
 //!   every object holds a counted reference to the device ([`Gpu`]).
 //! - Barriers are derived from the accesses that a kernel declares in its GLSL; no caller writes one.
 //! - Device memory holds plain data (`Pod`), for which every bit pattern is a valid value.

@@ -37,6 +37,7 @@ impl Gpu {
         record(&mut recorder)?;
         drop(recorder);
         frame.submit_and_wait()?;
+        frame.let_go();
         frame.tell()?;
         frame.times()
     }
@@ -59,8 +60,8 @@ impl<'a> Recorder<'a> {
     /// - The command buffer was made for the device and queue family of `gpu`, is recording outside a render pass, and
     ///   nobody else records into it until the recorder is dropped.
     /// - It is submitted at most once, to a queue of that device.
-    /// - `frame` is neither recorded into again nor dropped before that submission is complete: a command buffer with a pass of yours
-    ///   between two recordings takes two frames.
+    /// - `frame` is neither recorded into again nor released nor dropped before that submission is complete: a command buffer with a
+    ///   pass of yours between two recordings takes two frames.
     /// - No buffer that it uses is read or written from the submission until it is complete: by [`Buffer::read`],
     ///   [`Buffer::read_range`] or [`Buffer::write`], by [`Gpu::run`], by what calls any of these, or by another such submission,
     ///   unless that goes to the same queue or a semaphore orders the two. What calls them is all that returns what the device has

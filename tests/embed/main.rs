@@ -6,6 +6,7 @@ mod frames;
 #[path = "../support/hooks.rs"]
 mod hooks;
 mod job;
+mod memory;
 mod moving;
 #[path = "../support/poses.rs"]
 mod poses;

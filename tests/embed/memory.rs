@@ -1,0 +1,49 @@
+//! Tests what the renderer holds of an engine's memory, and for how long.
+#![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
+use crate::support::engine::Engine;
+use ash::vk::Handle;
+use std::path::Path;
+use tallow::gpu::{FrameResources, Gpu, Recorder};
+use tallow::render::{Outputs, Renderer};
+use tallow::scene::{Change, Loaded, Scene};
+
+fn scene() -> Loaded {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml"))
+        .map(|scene| scene.with(|s| (s.width, s.height, s.spp) = (160, 120, 1)))
+        .unwrap()
+}
+
+/// An engine's window changes its size: what is dropped is free when the device is done with it, not when a frame is recorded anew.
+#[test]
+fn frames_hold_no_memory_of_work_that_is_complete() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    let scene = scene();
+    let renderer = || Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    let mut frames: Vec<_> = (0..2).map(|_| FrameResources::new(&gpu).unwrap()).collect();
+    let before = gpu.allocated_bytes();
+    let run = renderer();
+    run.steps().for_each(|step| drop(run.run(&mut frames[0], &step).unwrap()));
+    drop(run);
+    assert_eq!(gpu.allocated_bytes(), before, "of runs");
+    assert!(frames[0].passes().is_ok_and(|passes| !passes.is_empty()), "what they took is told all the same");
+    let mut recorded = renderer();
+    for frame in &mut frames {
+        engine.run(|commands| {
+            // SAFETY: the command buffer is recording, and the engine waits for its submission.
+            let mut rec = unsafe { Recorder::external(&gpu, frame, commands.as_raw()) }.unwrap();
+            recorded.update(&mut rec, &scene, &Change::everything(&scene)).unwrap();
+            recorded.steps().for_each(|step| recorded.record(&mut rec, &step).unwrap());
+        });
+    }
+    drop(recorded);
+    assert!(
+        gpu.allocated_bytes() > before,
+        "control: of submissions of the engine's the frame does not know that they are complete"
+    );
+    frames.iter_mut().for_each(FrameResources::release);
+    assert_eq!(gpu.allocated_bytes(), before, "of submissions");
+    assert!(frames.iter().all(|frame| frame.passes().is_ok_and(|passes| !passes.is_empty())));
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
