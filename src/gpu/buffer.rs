@@ -326,12 +326,15 @@ impl Untyped {
         };
         let mut allocator = self.gpu.0.lock_allocator();
         let closing = || Error::Device(format!("{what}: the device is closing"));
-        let allocated = allocator.as_mut().ok_or_else(closing)?.allocate(&AllocationCreateDesc {
-            name: &self.name,
-            requirements,
-            location,
-            linear: true,
-            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+        let allocator = allocator.as_mut().ok_or_else(closing)?;
+        let (name, linear) = (self.name.as_str(), true);
+        let mut allocate = |allocation_scheme| {
+            allocator.allocate(&AllocationCreateDesc { name, requirements, location, linear, allocation_scheme })
+        };
+        let allocated = allocate(AllocationScheme::GpuAllocatorManaged).or_else(|error| match error {
+            // Where there is no room for one more block, there may be for the buffer alone.
+            AllocationError::OutOfMemory => allocate(AllocationScheme::DedicatedBuffer(self.raw)),
+            other => Err(other),
         });
         let memory = allocated.map_err(|error| match error {
             AllocationError::OutOfMemory => explain(what, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY),

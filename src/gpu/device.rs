@@ -10,6 +10,7 @@ use super::tuning::Tuning;
 use crate::error::{Error, Result};
 use ash::vk::Handle;
 use ash::{ext, khr, vk};
+use gpu_allocator::AllocationSizes;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::ffi::{CStr, CString};
 use std::mem::ManuallyDrop;
@@ -148,7 +149,7 @@ impl Gpu {
             physical_device: inner.physical,
             debug_settings: Default::default(),
             buffer_device_address: inner.ray_queries.is_some(),
-            allocation_sizes: Default::default(),
+            allocation_sizes: block_sizes(),
         });
         *inner.lock_allocator() = Some(allocator.map_err(|e| Error::Device(format!("memory allocator: {e}")))?);
         Ok(Self(Arc::new(inner)))
@@ -335,6 +336,14 @@ impl Drop for Inner {
             ManuallyDrop::drop(&mut self.instance);
         }
     }
+}
+
+/// Sizes of the blocks of memory that buffers share. The first are small, so that a small film takes little of a small memory; each is twice
+/// as large as the one before, so that there are few of them all the same.
+fn block_sizes() -> AllocationSizes {
+    const MIB: u64 = 1 << 20;
+    let first = AllocationSizes::new(4 * MIB, 4 * MIB);
+    first.with_max_device_memblock_size(256 * MIB).with_max_host_memblock_size(64 * MIB)
 }
 
 /// Chooses a device by index, or the best one, of those that a name is part of if there is one. `candidates` must not be empty.

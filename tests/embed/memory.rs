@@ -1,10 +1,12 @@
 //! Tests what the renderer holds of an engine's memory, and for how long.
 #![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
+use crate::hooks;
 use crate::support::engine::Engine;
 use ash::vk::Handle;
 use std::path::Path;
+use std::sync::atomic::Ordering::SeqCst;
 use tallow::gpu::{FrameResources, Gpu, Recorder};
-use tallow::render::{Outputs, Renderer};
+use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::{Change, Loaded, Scene};
 
 fn scene() -> Loaded {
@@ -45,5 +47,34 @@ fn frames_hold_no_memory_of_work_that_is_complete() {
     frames.iter_mut().for_each(FrameResources::release);
     assert_eq!(gpu.allocated_bytes(), before, "of submissions");
     assert!(frames.iter().all(|frame| frame.passes().is_ok_and(|passes| !passes.is_empty())));
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// A device whose memory is small has none for large blocks, and one where it is nearly all in use none but for what a buffer needs.
+#[test]
+fn a_small_render_takes_no_large_block_of_memory() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let scene = scene().with(|s| (s.width, s.height) = (300, 200)); // of more bytes than the smallest block
+    let render = || {
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED)?;
+        Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu)?)?;
+        renderer.picture()
+    };
+    // With how often the device was asked for memory.
+    let within = |most: u64| {
+        hooks::take_calls();
+        hooks::MOST_BYTES.store(most, SeqCst);
+        let picture = render();
+        hooks::MOST_BYTES.store(u64::MAX, SeqCst);
+        (picture, hooks::take_calls()["vkAllocateMemory"])
+    };
+    assert!(within(100).0.is_err(), "control: the device gives no more than it is told to");
+    let (shared, blocks) = within(32 << 20);
+    assert!(blocks < 5, "{blocks} blocks, which buffers share");
+    let (alone, buffers) = within(4 << 20);
+    assert!(shared.unwrap().pixels == alone.unwrap().pixels);
+    assert!(buffers > blocks, "control: {buffers}, of which the device refused some");
     assert_eq!(engine.messages(), Vec::<String>::new());
 }

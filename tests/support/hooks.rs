@@ -4,12 +4,15 @@ use ash::vk;
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_void};
 use std::mem::transmute;
-use std::sync::atomic::{AtomicBool, AtomicI32, Ordering::SeqCst};
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering::SeqCst};
 use std::sync::{LazyLock, Mutex};
 use tallow::gpu::RawDevice;
 
 /// While set, the device is lost to whatever is submitted, and to whoever asks for times.
 pub static LOSE: AtomicBool = AtomicBool::new(false);
+
+/// The most bytes that the device gives at once.
+pub static MOST_BYTES: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// While it is not 0, what every wait for a fence returns, without waiting.
 pub static WAIT: AtomicI32 = AtomicI32::new(0);
@@ -34,8 +37,13 @@ impl Outcome for () {
     }
 }
 
-/// Why `name` fails now, if it does.
-fn failure(name: &str) -> Option<vk::Result> {
+/// Why `name` fails now with the arguments that these point to, if it does.
+unsafe fn failure(name: &str, arguments: &[*const c_void]) -> Option<vk::Result> {
+    if name == "vkAllocateMemory" {
+        let info = unsafe { &**arguments[1].cast::<*const vk::MemoryAllocateInfo>() };
+        let fails = info.allocation_size > MOST_BYTES.load(SeqCst);
+        return fails.then_some(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+    }
     if name == "vkWaitForFences" {
         if let Some(f) = &*BEFORE_WAIT.lock().unwrap() {
             f();
@@ -103,7 +111,9 @@ macro_rules! between {
                         static REAL: Real<vk::$pfn> = Real(Mutex::new(None));
                         unsafe extern "system" fn ours($($arg: $type),+) -> $outcome {
                             *CALLS.lock().unwrap().entry(stringify!($name)).or_default() += 1;
-                            if let Some(outcome) = failure(stringify!($name)).and_then(<$outcome>::failure) {
+                            let arguments = [$((&raw const $arg).cast()),+];
+                            let failure = unsafe { failure(stringify!($name), &arguments) };
+                            if let Some(outcome) = failure.and_then(<$outcome>::failure) {
                                 return outcome;
                             }
                             unsafe { REAL.get()($($arg),+) }
