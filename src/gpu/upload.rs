@@ -3,36 +3,50 @@ use super::{Buffer, Gpu, Location};
 use crate::error::{Error, Result};
 use ash::vk;
 
-/// Words of the first buffer; later ones have at least twice what there was.
+/// Words of the smallest buffers. These are kept, so that scenes in which little moves allocate nothing.
 const LEAST: usize = 1 << 14;
 
-/// Mapped buffers that are filled one after another. They grow to what a frame needs and are reused by every recording.
+/// Recordings in a row that do without a larger buffer before it goes.
+const UNUSED: u32 = 2;
+
+/// Mapped buffers, each for one upload and for others that it has room for. They are reused by later recordings.
 #[derive(Default)]
 pub(super) struct Uploads {
-    buffers: Vec<Buffer<u32>>,
-    /// Words that are taken of the last buffer.
+    rooms: Vec<Room>,
+}
+
+struct Room {
+    buffer: Buffer<u32>,
+    /// Words that are taken of it.
     taken: usize,
+    /// Recordings that have done without it.
+    unused: u32,
 }
 
 impl Uploads {
-    /// Forgets what was uploaded; only the largest buffer is kept. The work that reads them must be complete.
+    /// Forgets what was uploaded. The work that reads it must be complete.
     pub fn reset(&mut self) {
-        self.buffers.drain(..self.buffers.len().saturating_sub(1));
-        self.taken = 0;
+        for room in &mut self.rooms {
+            room.unused = if room.taken > 0 { 0 } else { room.unused + 1 };
+            room.taken = 0;
+        }
+        self.rooms.retain(|room| room.unused < UNUSED || room.buffer.len() == LEAST);
     }
 
     /// Room for so many words, and the first of them: one buffer has them all.
     fn room(&mut self, gpu: &Gpu, words: usize) -> Result<(Buffer<u32>, usize)> {
-        let had = self.buffers.last().map_or(0, Buffer::len);
-        if had < self.taken + words {
-            let size = words.max(2 * had).max(LEAST);
-            self.buffers.push(Buffer::new(gpu, "uploads", size, Location::Upload)?);
-            self.taken = 0;
+        let fits = |&at: &usize| self.rooms[at].buffer.len() - self.rooms[at].taken >= words;
+        // The smallest, so that a few words do not keep a large one.
+        let smallest = (0..self.rooms.len()).filter(fits).min_by_key(|&at| self.rooms[at].buffer.len());
+        if smallest.is_none() {
+            let buffer = Buffer::new(gpu, "uploads", rounded(words), Location::Upload)?;
+            self.rooms.push(Room { buffer, taken: 0, unused: 0 });
         }
-        let first = self.taken;
-        self.taken += words;
-        let buffer = self.buffers.last().ok_or_else(|| Error::Device("uploads have no buffer".into()))?;
-        Ok((buffer.clone(), first))
+        let at = smallest.unwrap_or(self.rooms.len() - 1);
+        let room = &mut self.rooms[at];
+        let first = room.taken;
+        room.taken += words;
+        Ok((room.buffer.clone(), first))
     }
 
     /// Writes bytes, whole words, into a buffer, and returns it and the first byte.
@@ -57,4 +71,9 @@ impl Uploads {
         copied.ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))?;
         Ok((buffer, first))
     }
+}
+
+/// Words of a buffer for so many: up to a quarter more, so that the next upload finds room even when it is a little longer.
+fn rounded(words: usize) -> usize {
+    words.next_multiple_of((words.next_power_of_two() / 8).max(1)).max(LEAST)
 }

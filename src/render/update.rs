@@ -25,7 +25,7 @@ impl Renderer {
     /// away, update with [`Change::everything`].
     ///
     /// Nothing is compiled. Memory is allocated where there is more of something than ever before, such as nodes of a hierarchy or
-    /// lights, with room for more.
+    /// lights, with room for more, and where more is uploaded than by the last two recordings into the frame.
     ///
     /// # Errors
     /// [`Error::Usage`] with the first effect that the scene calls for now and that was not compiled: make the renderer with it, by

@@ -7,6 +7,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering::SeqCst;
 use tallow::gpu::{FrameResources, Gpu, Recorder};
 use tallow::render::{Job, Outputs, Renderer};
+use tallow::scene::description::{Description, EnvironmentTable, Mesh, MeshTable};
 use tallow::scene::{Change, Loaded, Scene};
 
 fn scene() -> Loaded {
@@ -76,5 +77,41 @@ fn a_small_render_takes_no_large_block_of_memory() {
     let (alone, buffers) = within(4 << 20);
     assert!(shared.unwrap().pixels == alone.unwrap().pixels);
     assert!(buffers > blocks, "control: {buffers}, of which the device refused some");
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// A grid of triangles above which a sky is.
+fn grid(side: u32) -> Loaded {
+    let positions = (0..side * side).map(|i| [(i % side) as f32, ((i * i) % 7) as f32, (i / side) as f32]).collect();
+    let cells = (0..(side - 1) * (side - 1)).map(|i| i / (side - 1) * side + i % (side - 1));
+    let indices = cells.flat_map(|a| [a, a + side, a + 1, a + 1, a + side, a + side + 1]).collect();
+    let mesh = MeshTable { data: Some(Mesh { positions, indices, ..Mesh::default() }), ..MeshTable::default() };
+    let environment = Some(EnvironmentTable::default());
+    let description = Description { mesh: vec![mesh], environment, ..Description::default() };
+    Scene::build(&description).unwrap().with(|s| (s.width, s.height, s.spp) = (16, 9, 1))
+}
+
+/// Uploads take memory for what they hold, and give it back when the recordings that follow do without.
+#[test]
+fn a_frame_does_not_keep_the_memory_of_a_large_upload() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    let scene = grid(200);
+    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+    let arrays: u64 = renderer.scene().sizes().iter().map(|(_, bytes)| bytes).sum();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let without = gpu.allocated_bytes();
+    let mut takes = |change: &Change| {
+        gpu.run(&mut frame, |rec| renderer.update(rec, &scene, change)).unwrap();
+        gpu.allocated_bytes() - without
+    };
+    let everything = Change::everything(&scene);
+    let taken = takes(&everything);
+    assert!((arrays / 2..arrays * 5 / 4 + (1 << 20)).contains(&taken), "{taken} bytes for {arrays}");
+    assert_eq!([(); 4].map(|()| takes(&everything)), [taken; 4], "what is uploaded again and again finds its memory");
+    let few = Change { instances: true, materials: true, ..Change::default() };
+    let after = [(); 3].map(|()| takes(&few));
+    assert!(after[0] == taken && after[2] < 1 << 20, "{after:?} bytes of {taken}");
     assert_eq!(engine.messages(), Vec::<String>::new());
 }
