@@ -1,4 +1,4 @@
-//! Eight-way compressed BVHs (Ylitie et al. 2017) of two-way trees by obvhs: PLOC (Meister and Bittner 2018) and reinsertion. Triangles
+//! Eight-way compressed BVHs (Ylitie et al. 2017) of two-way trees: PLOC (Meister and Bittner 2018) and reinsertion by obvhs. Triangles
 //! and their shading are put in leaf order; child and primitive indices are made global, so one array holds all levels.
 use super::geometry::{self, Geometry};
 use crate::layout::{BvhNode, Instance, TRAVERSAL_STACK, Triangle};
@@ -8,7 +8,6 @@ use obvhs::Boundable;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::ops::Range;
@@ -16,6 +15,7 @@ use wide::Wide;
 
 mod clusters;
 mod level;
+mod ploc;
 mod refit;
 mod shallow;
 mod wide;
@@ -162,12 +162,12 @@ pub fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNo
 /// no fewer. Meshes so large that loading takes seconds keep to 2 %.
 fn compressed<T: Boundable + Sync>(items: &[T]) -> Wide {
     let clusters = Clusters::new(items);
-    let mut bvh2 = match &clusters {
-        Some(clusters) => paired(&clusters.boxes(items)),
-        None => paired(items),
+    let (mut bvh2, nested) = match &clusters {
+        Some(clusters) => ploc::tree(&clusters.boxes(items)),
+        None => ploc::tree(items),
     };
     let share = if items.len() > 1_000_000 { 0.02 } else { 0.1 };
-    ReinsertionOptimizer::default().run(&mut bvh2, share, None);
+    reinsert(&mut bvh2, share, nested);
     bvh2.parents = Vec::new();
     if let Some(clusters) = clusters {
         clusters.unfold(&mut bvh2, items);
@@ -175,11 +175,19 @@ fn compressed<T: Boundable + Sync>(items: &[T]) -> Wide {
     collapsed(&mut bvh2)
 }
 
-/// The two-way tree of PLOC.
-fn paired<T: Boundable + Sync>(items: &[T]) -> Bvh2 {
-    let indices = (0..items.len() as u32).collect();
-    let mut builder = PlocBuilder::with_capacity(items.len());
-    builder.build(PlocSearchDistance::Low, items, indices, SortPrecision::U64, 2)
+/// Reinserts this share of the nodes, and ever fewer. Where boxes are nested this makes chains again, which take long and overflow
+/// the stack of obvhs: it ends with the first that are deeper than PLOC went.
+fn reinsert(bvh2: &mut Bvh2, share: f32, nested: bool) {
+    let mut optimizer = ReinsertionOptimizer::default();
+    if !nested {
+        return optimizer.run(bvh2, share, None);
+    }
+    for part in (1..32).step_by(2) {
+        if bvh2.depth(0) > bvh2.max_depth {
+            return;
+        }
+        optimizer.run(bvh2, share, Some(vec![1.0 / part as f32]));
+    }
 }
 
 /// Eight-way nodes of at most [`LEVELS`] levels: subtrees that are too deep are replaced by balanced ones, ever nearer to the root.

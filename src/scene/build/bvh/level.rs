@@ -1,5 +1,5 @@
-//! Trees that are too deep. Boxes inside boxes, as of thin triangles that share a corner, make PLOC a chain that is as
-//! long as they are many. What lies deep in it is halved instead, in the order in which the tree has it.
+//! Trees that are too deep. Boxes inside boxes, as of thin triangles that share a corner, become chains by PLOC and by
+//! reinsertion. What lies deep in them is halved instead, in the order in which the tree has it.
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
