@@ -108,15 +108,17 @@ bool clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycen
 }
 
 // Whether a partly transparent surface stops a ray. A ray passes with the probability 1 - opacity, decided by a hash, so that the
-// light that passes is right on average, and a cut-out mask (0 or 1) is exact. A clear wall dims the light of a shadow ray, without
-// noise, and must be asked once only.
+// light that passes is right on average, and a cut-out mask (0 or 1) is exact. Clear walls, and materials that let a share of light
+// pass everywhere, dim the light of shadow rays to lights without extent, without noise, and must be asked once only.
 bool mask_blocks(uint triangle, uint instance, vec2 barycentric, vec3 direction, uint seed) {
     uint material = material_of(triangle, instance);
     float opacity = surface_opacity(material, triangle, barycentric);
-    if (FX_CLEAR_WALLS && (seed & PASSES_WALLS) != 0u && (Material_flags(materials, material) & MATERIAL_CLEAR_WALL) != 0u) {
+    if (FX_CLEAR_WALLS && (seed & PASSES_WALLS) != 0u) {
         vec3 share;
-        if (clear_wall_passes(material, triangle, instance, barycentric, direction, share))
-            return !pass_wall(1.0 - opacity * (1.0 - share));
+        bool clear = (Material_flags(materials, material) & MATERIAL_CLEAR_WALL) != 0u &&
+                     clear_wall_passes(material, triangle, instance, barycentric, direction, share);
+        if (!clear) share = vec3(0.0);
+        if (clear || Material_opacity(materials, material) < 1.0) return !pass_wall(1.0 - opacity * (1.0 - share));
     }
     // Two copies of a triangle on one ray decide independently.
     uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;

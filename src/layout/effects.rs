@@ -106,7 +106,7 @@ effects! {
     coat_normals: FX_COAT_NORMALS;
     /// One that lets light through as a thin wall.
     thin_walls: FX_THIN;
-    /// Smooth thin walls that let the light of point, spot and directional lights pass.
+    /// Smooth thin walls, and materials of an opacity below 1, that dim the light of point, spot and directional lights.
     clear_walls: FX_CLEAR_WALLS;
     /// A conductor or dielectric whose roughness depends on the direction.
     anisotropic: FX_ANISOTROPIC;

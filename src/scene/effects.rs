@@ -155,16 +155,18 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
 fn material_needs(scene: &Scene, m: &Material, sharp: bool, effect: Effect) -> bool {
     let flagged =
         |flags: u32| m.textures().filter_map(|(_, t)| scene.textures.get(t as usize)).any(|t| t.flags & flags != 0);
-    let clear_wall = || sharp && m.flags & MATERIAL_CLEAR_WALL != 0;
+    let is_masked = m.flags & MATERIAL_MASKED != 0;
+    let is_veil = is_masked && m.opacity < 1.0 && m.alpha_cutoff == 0.0;
+    let clear_wall = || sharp && (m.flags & MATERIAL_CLEAR_WALL != 0 || is_veil);
     let coated = m.kind == BSDF_METALLIC && m.clearcoat > 0.0;
     match effect {
         Effect::textures | Effect::bump_maps | Effect::normal_maps => m.textures().any(|(reader, _)| reader == effect),
         Effect::texture_modes => flagged(MODES),
         Effect::hdr_textures => flagged(TEXTURE_RGB9E5 | TEXTURE_FLOAT),
         Effect::second_uv => flagged(TEXTURE_SECOND_UV),
-        Effect::alpha_cutoff => m.flags & MATERIAL_MASKED != 0 && m.alpha_cutoff > 0.0,
+        Effect::alpha_cutoff => is_masked && m.alpha_cutoff > 0.0,
         // Shadow rays pass clear walls as they pass masks.
-        Effect::alpha_masks => m.flags & MATERIAL_MASKED != 0 || clear_wall(),
+        Effect::alpha_masks => is_masked || clear_wall(),
         Effect::diffuse => matches!(m.kind, BSDF_DIFFUSE | BSDF_COATED),
         Effect::conductor => m.kind == BSDF_CONDUCTOR,
         Effect::dielectric => m.kind == BSDF_DIELECTRIC,

@@ -73,15 +73,17 @@ pub fn mask_bits(word: u32) -> u32 {
 }
 
 /// What a partly transparent surface leaves of a ray's light. It stops a ray or lets it pass, decided by a hash of `seed`, but for
-/// clear walls, which dim the light of shadow rays. `direction` is that of the ray in the space of the triangle.
+/// clear walls and constant opacities, which dim the light of shadow rays. `direction` is that of the ray in the space of the triangle.
 pub fn mask_leaves(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec2, direction: Vec3, seed: u32) -> Vec3 {
     let number = material_of(scene, triangle, instance);
     let material = &scene.materials[number as usize];
     let opacity = surface_opacity(scene, number, triangle, barycentric);
-    if seed & PASSES_WALLS != 0 && material.flags & MATERIAL_CLEAR_WALL != 0 {
-        let passes = clear_wall_passes(scene, material, (triangle, instance), barycentric, direction);
-        if let Some(share) = passes {
-            return 1.0 - opacity * (1.0 - share);
+    if seed & PASSES_WALLS != 0 {
+        let is_wall = material.flags & MATERIAL_CLEAR_WALL != 0;
+        let passes = || clear_wall_passes(scene, material, (triangle, instance), barycentric, direction);
+        let share = is_wall.then(passes).flatten();
+        if share.is_some() || material.opacity < 1.0 {
+            return 1.0 - opacity * (1.0 - share.unwrap_or_default());
         }
     }
     let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);

@@ -264,6 +264,33 @@ fn a_light_behind_a_wall_does_not_starve_those_that_are_seen() {
     assert!(variance < 1.5 * most / 256.0, "{variance} of {}", most / 256.0);
 }
 
+/// Below two veils of opacity a and b a sun leaves (1 - a) (1 - b) of its light, without noise: one sample tells it. Rays of a path decide
+/// by chance, so that none goes further than the floor here.
+#[test]
+fn veils_dim_a_sun_without_noise() {
+    let below = |veils: &str| {
+        rendered(&Workplace::new().scene(&format!(
+            "[film]\nwidth = {SIDE}\nheight = {SIDE}\nfilter = 'point'\n[camera]\nposition = [0.0, 1.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n\
+             up = [0.0, 0.0, -1.0]\nfov = 40.0\n[render]\nspp = 1\nmax_depth = 2\n\
+             [[light]]\ntype = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = 2.0\n\
+             [[material]]\nname = 'thin'\nopacity = 0.4\n[[material]]\nname = 'dense'\nopacity = 0.75\n\
+             [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 9.0 }}\n{veils}"
+        )))
+    };
+    let veil = |name: &str, y: f32| {
+        format!(
+            "[[mesh]]\nshape = 'rectangle'\nmaterial = '{name}'\n\
+             transform = {{ rotate = [-90.0, 0.0, 0.0], scale = 9.0, translate = [0.0, {y}, 0.0] }}\n"
+        )
+    };
+    let bare = below("");
+    for (veils, left) in [(veil("thin", 3.0), 0.6), (veil("thin", 3.0) + &veil("dense", 4.0), 0.15)] {
+        for (s, b) in below(&veils).iter().zip(&bare) {
+            assert!(b.mean[0] > 0.0 && (s.mean[0] / b.mean[0] - left).abs() < 1e-4, "{} of {}", s.mean[0], b.mean[0]);
+        }
+    }
+}
+
 /// In single precision the cosines of small angles are alike.
 #[test]
 fn narrow_spots_fall_off_linearly_in_the_angle() {
