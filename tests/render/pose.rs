@@ -82,7 +82,7 @@ fn an_effect_that_was_not_compiled_is_named() {
     gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &back)).unwrap();
     assert!(render(&gpu, &renderer) == fresh(&gpu, &at(&Moment::default())));
     let change = scene.apply(&Pose { materials: vec![(0, fade)], ..Pose::default() }).unwrap();
-    let effects = Effects { alpha_masks: true, ..*renderer.effects() };
+    let effects = Effects { alpha_masks: true, clear_walls: true, ..*renderer.effects() };
     let mut able = Renderer::specialised(&gpu, &scene, &scene.settings, OUTPUTS, effects).unwrap();
     gpu.run(&mut frame, |rec| able.update(rec, &scene, &change)).unwrap();
 }
