@@ -55,7 +55,8 @@ impl Renderer {
         let lacks = |what: String| Error::Usage(format!("the frame before {what}"));
         self.check_split(film::splits_light(film).map_err(lacks)?)?;
         let pixels = film::pixels(film).map_err(lacks)?;
-        check_values(&pixels, film.width).map_err(lacks)?;
+        let broken = |what| Error::Usage(format!("the frame before: {what}"));
+        check_values(&pixels, film.width).map_err(broken)?;
         let [samples, age] = [SAMPLES, AGE].map(|name| film::counts(film, name).map_err(lacks));
         let (samples, age) = (samples?, age?);
         // Numbers of a damaged file stay within their bits.

@@ -106,12 +106,12 @@ fn check_pixels(pixels: &[Pixel], width: u32, most: u32) -> Result<(), String> {
 /// Checks that all values are such as samples have.
 ///
 /// # Errors
-/// A predicate that names the first pixel.
+/// A sentence that names the first pixel.
 pub(super) fn check_values(pixels: &[Pixel], width: u32) -> Result<(), String> {
     let found = pixels.iter().enumerate().find_map(|(i, pixel)| Some((i as u32, broken(pixel)?)));
     found.map_or(Ok(()), |(i, (layer, value))| {
         let (x, y) = (i % width, i / width);
-        Err(format!("has {value} in the layer {layer} of pixel ({x}, {y}): no samples can be added to that"))
+        Err(format!("pixel ({x}, {y}) has {value} in the layer {layer}: no samples can be added to that"))
     })
 }
 

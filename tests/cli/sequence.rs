@@ -2,7 +2,7 @@
 use crate::command::{complains, stdout, tallow};
 use std::fs;
 use std::process::Output;
-use tallow::image::{self, Film, Samples};
+use tallow::image::{self, Film, Samples, WriteOptions};
 use tempfile::TempDir;
 
 const SMALL: &str = "--width 40 --height 25 --spp 2";
@@ -170,6 +170,17 @@ fn carries_and_goes_on(way: &str) {
         let line = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && line.contains("has samples of earlier frames"), "{words}: {line}");
     }
+    // Nothing goes on from a frame with values that no samples have.
+    well(&folder, &words(""));
+    let mut spoilt = image::read(&file("a.0011.exr")).unwrap();
+    let red = spoilt.channels.iter_mut().find(|c| c.name == "R").map(|c| &mut c.samples);
+    let Some(Samples::F32(values)) = red else { panic!("no red") };
+    values[41] = f32::NAN;
+    image::write(&file("a.0011.exr"), &spoilt, &WriteOptions::default()).unwrap();
+    fs::remove_file(file("a.0012.exr")).unwrap();
+    let output = run(&folder, &words(""));
+    let line = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(6) && line.contains("pixel (1, 1) has NaN"), "{output:?}");
 }
 
 /// Keys call for an effect now and then; a renderer that is made anew for it has no samples to carry.
