@@ -78,7 +78,7 @@ void fold_light(inout PixelLight l, vec3 kept, vec3 albedo, float share, uint co
     }
 }
 
-// Adds the sample at `at`. A negative number of rays marks one that was not finite; `first_broken` is the first one's index.
+// Adds the sample at `at`. A negative number of rays marks one that is wrong; `first_broken` is the first one's index.
 void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout uint first_broken, int at) {
     vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at);
     vec3 radiance = first.rgb;

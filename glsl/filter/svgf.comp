@@ -20,13 +20,12 @@ const int IMAGES = TWO ? 2 : 1;
 const float LEAST_DEVIATION = 1e-30; // stands for 0, so that equal pixels are alike where nothing varies
 // Departure: above this number of samples noise is little beside what neighbours truly differ by, and the weight narrows with their
 // fourth root. Over 14 scenes the filter alone has .96 of the relMSE at 16 samples, .86 at 64, and .99 and .92 of FLIP. `auto`, which
-// weighs what it makes of the image against other candidates, would have 1.05 of the relMSE at 64.
+// weighs what it makes of two images against other candidates, would have 1.05 of the relMSE at 64.
 const float FEW = 8.0;
-layout(constant_id = 116) const bool NARROWS = true;
 const float STEEPEST = 1e8; // weight per standard deviation, finite over LEAST_DEVIATION
 
 // How much narrower the weight of luminance is at so many samples.
-float narrowed(float count) { return NARROWS ? sqrt(sqrt(max(count / FEW, 1.0))) : 1.0; }
+float narrowed(float count) { return TWO ? 1.0 : sqrt(sqrt(max(count / FEW, 1.0))); }
 
 int index(ivec2 at) {
     return at.y * int(push.size.x) + at.x;

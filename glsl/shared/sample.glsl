@@ -1,6 +1,6 @@
 // What a path leaves behind: one vec4 (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). With
 // FX_SOFT what lamps and sky bring to the first hit goes with indirect light, since it is as noisy. w of the first is the number of
-// rays, negated where the light was not finite, such a sample is black, or where the path `ended_early`.
+// rays, negated where the sample is wrong: its light was not finite, and it is black, or its path `ended_early`.
 #include "shared/finite.glsl"
 #include "shared/path_state.glsl"
 #include "shared/counters.glsl"

@@ -11,7 +11,7 @@ Hit traverse(Segment ray, uint root) {
     do {
         done = traversal_step(t, space, false, root, ray.mask_seed, uvec2(NONE));
     } while (!done);
-    ended_early = ended_early || !done;
+    ended_early = ended_early || has_nodes_left(t);
     return t.hit;
 }
 
@@ -33,7 +33,7 @@ Hit trace_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, 
             done = !alive;
         }
     } while (!done);
-    ended_early = ended_early || !done;
+    ended_early = ended_early || any_hit || (alive && has_nodes_left(t));
     return t.hit;
 }
 #endif

@@ -16,7 +16,6 @@ void trace_path(inout PathState p, bool on, Sampler random) {
     if (any_lane(going)) do {
         uvec2 from = uvec2(p.hit.triangle, p.hit.instance);
         Departure d = leave(p, s, going, random);
-        going = d.alive;
         if (!DEALT && !d.alive && !d.shadowed) break;
         bool lit = d.shadowed;
         Segment next = next_segment(p);
@@ -30,5 +29,4 @@ void trace_path(inout PathState p, bool on, Sampler random) {
         }
         going = d.alive && arrive(p, s);
     } while (any_lane(going));
-    ended_early = ended_early || going;
 }

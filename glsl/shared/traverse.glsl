@@ -9,7 +9,8 @@
 #include "shared/texture.glsl"
 
 uint nodes_visited = 0u; // by this thread
-// Whether a search of this thread was left before its end, as llvmpipe does after many turns: see shared/loop_limit.glsl.
+// Whether a search of this thread was left before its end, as llvmpipe does after many turns: see shared/loop_limit.glsl. The state
+// tells it, not the loop's condition, which compilers take for known behind the loop.
 bool ended_early = false;
 
 // Number of groups that a ray of this scene can leave on its stack (scene/build/bvh.rs). Two stay in registers. lavapipe writes
@@ -209,6 +210,9 @@ Traversal traversal_start(float t_max, uint root) {
     t.last = false;
     return t;
 }
+
+// Whether a search that is to visit every node has yet some to visit.
+bool has_nodes_left(Traversal t) { return t.bits > 0x00ffffffu || t.depth > 0u; }
 
 void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
     uint bit = take_highest(leaves.y);

@@ -338,8 +338,8 @@ impl Drop for Inner {
     }
 }
 
-/// Sizes of the blocks of memory that buffers share. The first are small, so that a small film takes little of a small memory; each is twice
-/// as large as the one before, so that there are few of them all the same.
+/// Sizes of the blocks of memory that buffers share. The first are small, so that a small film takes little of a small memory; each is
+/// twice as large as the one before, so that there are few of them all the same.
 fn block_sizes() -> AllocationSizes {
     const MIB: u64 = 1 << 20;
     let first = AllocationSizes::new(4 * MIB, 4 * MIB);

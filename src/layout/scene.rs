@@ -34,7 +34,8 @@ gpu_structs! {
         orthographic: uint,
     }
 
-    /// One eight-way compressed node (Ylitie et al. 2017), as `scene::build::bvh` lays it out; child and triangle indices are global. 5 texels.
+    /// One eight-way compressed node (Ylitie et al. 2017), as `scene::build::bvh` lays it out; child and triangle indices are global.
+    /// 5 texels.
     struct BvhNode {
         /// Origin of the quantisation grid, world (or object) units.
         p: vec3,

@@ -297,7 +297,7 @@ impl FilmTile {
 /// What a frame writes. Buffers that the outputs do not call for hold one element.
 pub struct FilmBuffers {
     /// vec4 per sample in flight, three with direct and indirect light apart; w of the first is the number of its rays, less
-    /// than 0 where the light was no number. Overwritten by every batch.
+    /// than 0 where the sample is wrong. Overwritten by every batch.
     pub samples: Buffer<vec4>,
     /// The film, in order; one tile unless a device's buffers are too small for that.
     pub tiles: Vec<FilmTile>,

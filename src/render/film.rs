@@ -38,7 +38,7 @@ pub(crate) const BLUR: &str = "denoising blur";
 /// What rounding took off the means of pixels with thousands of samples: only in files that have such pixels.
 const REMAINDERS: [&str; 2] = ["remainder", "light.remainder"];
 
-/// Metadata of what was no number.
+/// Metadata of samples that are wrong.
 const BROKEN: &str = "brokenSamples";
 
 /// Of a film with everything.

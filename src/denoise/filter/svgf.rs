@@ -76,7 +76,7 @@ impl Levels {
     ) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
         let (edge, local_size_x) = (rates.constants(), gpu.tuning().filter_workgroup);
-        let kernel = |last| Kernel::new(gpu, &Constants { edge, local_size_x, last, two, narrows: !two });
+        let kernel = |last| Kernel::new(gpu, &Constants { edge, local_size_x, last, two });
         let pixels = width as usize * height as usize;
         let scratch = |pixels| Buffer::new(gpu, "svgf", pixels, Location::Device);
         Ok(Self {

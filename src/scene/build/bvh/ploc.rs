@@ -80,7 +80,8 @@ fn search<const N: usize>(roots: &[Bvh2Node], partners: &mut [i8]) {
         // Of each of the last N boxes, what it costs to merge it with those behind it.
         let mut costs = [[f32::INFINITY; N]; N];
         for at in first..start + partners.len() {
-            let (mut least, mut partner) = (f32::INFINITY, 0);
+            // One that costs nothing comparable takes the box beside it.
+            let (mut least, mut partner) = (f32::INFINITY, if at == 0 { 1 } else { -1 });
             let mut choose = |cost, offset| {
                 if cost <= least {
                     (least, partner) = (cost, offset);
