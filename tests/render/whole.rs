@@ -600,7 +600,7 @@ fn paths_that_a_driver_ends_early_are_told() {
     let tunings = [Tuning::CPU.deals, false].map(|deals| Tuning { deals, ..Tuning::CPU });
     for (tuning, (count, ends, scene)) in tunings.iter().flat_map(|t| scenes.iter().map(move |s| (t, s))) {
         let gpu = support::tuned_gpu(*tuning);
-        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+        let renderer = Renderer::new(&gpu, scene, &scene.settings, Outputs::default()).unwrap();
         Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
         let (stats, broken) = (support::stats(&renderer), renderer.broken_samples().unwrap());
         assert_eq!(broken.is_some_and(|broken| broken.count > 0), *ends, "{count}, {tuning:?}: {broken:?}");
