@@ -38,11 +38,14 @@ impl Uploads {
         let fits = |&at: &usize| self.rooms[at].buffer.len() - self.rooms[at].taken >= words;
         // The smallest, so that a few words do not keep a large one.
         let smallest = (0..self.rooms.len()).filter(fits).min_by_key(|&at| self.rooms[at].buffer.len());
-        if smallest.is_none() {
-            let buffer = Buffer::new(gpu, "uploads", rounded(words), Location::Upload)?;
-            self.rooms.push(Room { buffer, taken: 0, unused: 0 });
-        }
-        let at = smallest.unwrap_or(self.rooms.len() - 1);
+        let at = match smallest {
+            Some(at) => at,
+            None => {
+                let buffer = Buffer::new(gpu, "uploads", rounded(words), Location::Upload)?;
+                self.rooms.push(Room { buffer, taken: 0, unused: 0 });
+                self.rooms.len() - 1
+            }
+        };
         let room = &mut self.rooms[at];
         let first = room.taken;
         room.taken += words;
