@@ -1,6 +1,7 @@
 // Camera rays.
 #include "shared/frame.glsl"
 #include "shared/sampler.glsl"
+#include "shared/segment.glsl"
 #include "shared/warp.glsl"
 
 struct Ray {
@@ -52,4 +53,7 @@ Ray eye_ray(vec2 film, Sampler random) {
 
 // Seed of the alpha masks along a path. The frame's seed is hashed, or seeds 0 and 1 would swap the numbers of neighbouring
 // pixels; it is inverted, or the numbers would be those of `sampler_start`.
-uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ pcg(~push.constants.seed)) + index); }
+uint path_seed(uint pixel, uint index) {
+    uint hash = pcg(pixel ^ pcg(~push.constants.seed));
+    return ((FX_INDEPENDENT ? pcg(hash + index) : bitfieldReverse(index)) & MASK_INDEX) | (hash & MASK_HASH) | BY_CHANCE;
+}

@@ -47,15 +47,14 @@ bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
 // that they change as the image does; a normal that points back along the way tells where in the sky it ends. The albedo is what
 // the light from there is multiplied by on its way. `first` becomes the first hit, smooth or not, and `kept` the albedo that paths
 // keep which begin like this: 1 times the throughput where they choose a way, since their light is then that of either.
-Guide seen_hit(Ray ray, uint mask_seed, out Guide first, out Hit first_hit, out vec3 kept) {
+Guide seen_hit(Ray ray, uint seed, out Guide first, out Hit first_hit, out vec3 kept) {
     Sight sight = Sight(ray, 0.0, vec3(1.0), vec3(0.0), false);
     Guide seen;
     bool on;
     uint bounce = 0u;
     // Rays are traced and surfaces read in one place of the code, whose size decides how long the kernels take to compile.
     do {
-        uint seed = bounce == 0u ? mask_seed : pcg(mask_seed + bounce);
-        Hit hit = traverse(Segment(sight.way.origin, sight.way.direction, INFINITE_DISTANCE, mask_bits(seed)), push.constants.root);
+        Hit hit = traverse(Segment(sight.way.origin, sight.way.direction, INFINITE_DISTANCE, path_mask_seed(seed, bounce)), push.constants.root);
         seen = Guide_zero();
         seen.object = seen.material = NONE;
         bool sky = hit.triangle == NONE;

@@ -99,7 +99,7 @@ Segment saved_ray(uint i, bool shadow) {
     vec3 origin = kept(shadow ? SHADOW_ORIGIN : ORIGIN, i, end), direction = kept(shadow ? SHADOW : DIRECTION, i);
     uint passes = (state & PASSING) != 0u ? PASSES_WALLS : 0u;
     if (shadow) return Segment(origin, direction, uintBitsToFloat(end), shadow_mask_seed(seed, bounce - 1u) | passes);
-    return Segment(origin, direction, INFINITE_DISTANCE, mask_seed(seed, bounce));
+    return Segment(origin, direction, INFINITE_DISTANCE, path_mask_seed(seed, bounce));
 }
 
 // The triangle that a path leaves, and its instance.

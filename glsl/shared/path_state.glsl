@@ -73,13 +73,10 @@ PathState path_state(vec3 origin, vec3 direction, bool sharp_only, uint seed) {
     return PathState(path, Hit(0.0, NONE, NONE, 0.0, 0.0), seed, sharp_only, 0u, 0u, false, 1u, 0u, none, vec3(0.0));
 }
 
-// What decides about masks on the way to the surface number `bounce`, and on that from there to a light.
-uint mask_seed(uint seed, uint bounce) { return mask_bits(pcg(seed + 2u * bounce)); }
-uint shadow_mask_seed(uint seed, uint bounce) { return mask_seed(seed, bounce) + 2u; }
 
 // The ray from the camera, or to the next surface.
 Segment next_segment(PathState p) {
-    return Segment(p.path.origin, p.path.direction, INFINITE_DISTANCE, mask_seed(p.seed, p.bounce));
+    return Segment(p.path.origin, p.path.direction, INFINITE_DISTANCE, path_mask_seed(p.seed, p.bounce));
 }
 
 // Adds what was sampled at the surface that the path has left, where nothing blocks it.

@@ -1,4 +1,5 @@
 // A ray, and what it meets.
+#include "shared/pcg.glsl"
 
 struct Hit {
     float t;          // distance in lengths of the ray's direction
@@ -7,10 +8,18 @@ struct Hit {
     float b1, b2;     // weights of vertices 1 and 2; of a sphere, see sphere.glsl
 };
 
-// Seeds of masks are even, but for shadow rays of lights without extent, which pass clear walls.
-const uint PASSES_WALLS = 1u;
+// Seeds of masks hold the index of the sample, its bits reversed, and below it a hash of all else. Without BY_CHANCE, half and less of
+// opacity lets every ray pass: STRONGER_WAY. PASSES_WALLS is set for shadow rays of lights without extent, which pass clear walls.
+const uint STRONGER_WAY = 0u, MASK_INDEX = 0xffff0000u, MASK_HASH = 0xfffcu, BY_CHANCE = 2u, PASSES_WALLS = 1u;
 
 uint mask_bits(uint word) { return word & ~PASSES_WALLS; }
+
+// What decides about masks on a path's way to its surface number `bounce`, and on that from there to a light.
+uint mask_seed(uint seed, uint way) {
+    return (seed & (MASK_INDEX | BY_CHANCE)) | (pcg((seed & MASK_HASH) ^ (way << 16)) & MASK_HASH);
+}
+uint path_mask_seed(uint seed, uint bounce) { return mask_seed(seed, 2u * bounce); }
+uint shadow_mask_seed(uint seed, uint bounce) { return mask_seed(seed, 2u * bounce + 1u); }
 
 // A ray whose hits count before `t_max`, in lengths of `direction`.
 struct Segment {

@@ -2,7 +2,7 @@
 // unused. There are no mip levels: a pixel's samples average a texture without the bias of a blur, and levels would cost a third
 // more memory.
 #include "shared/largest_channel.glsl"
-#include "shared/pcg.glsl"
+#include "shared/sampler.glsl"
 #include "shared/scene.glsl"
 #include "shared/segment.glsl"
 #include "shared/texel_word.glsl"
@@ -107,8 +107,16 @@ bool clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycen
     return m.alpha * factors.g * factors.g < SMOOTH_ALPHA;
 }
 
-// Whether a partly transparent surface stops a ray. A ray passes with the probability 1 - opacity, decided by a hash, so that the
-// light that passes is right on average, and a cut-out mask (0 or 1) is exact. Clear walls, and materials that let a share of light
+// The number in [0, 1) that a surface's opacity is compared with: over the samples of a pixel one dimension of the sampler for each
+// surface, so that of 2^k samples in a row as many pass as should, to one. Two copies of a triangle on one ray decide independently.
+float mask_number(uint triangle, uint instance, uint seed) {
+    uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
+    if ((seed & BY_CHANCE) == 0u) return 0.5;
+    return unit_interval(owen_reversed(seed & MASK_INDEX, pcg(surface ^ (seed & MASK_HASH))));
+}
+
+// Whether a partly transparent surface stops a ray. A ray passes with the probability 1 - opacity, so that the light that passes is
+// right on average, and a cut-out mask (0 or 1) is exact. Clear walls, and materials that let a share of light
 // pass everywhere, dim the light of shadow rays to lights without extent, without noise, and must be asked once only.
 bool mask_blocks(uint triangle, uint instance, vec2 barycentric, vec3 direction, uint seed) {
     uint material = material_of(triangle, instance);
@@ -120,7 +128,5 @@ bool mask_blocks(uint triangle, uint instance, vec2 barycentric, vec3 direction,
         if (!clear) share = vec3(0.0);
         if (clear || Material_opacity(materials, material) < 1.0) return !pass_wall(1.0 - opacity * (1.0 - share));
     }
-    // Two copies of a triangle on one ray decide independently.
-    uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
-    return opacity > unit_interval(pcg(seed ^ surface));
+    return opacity > mask_number(triangle, instance, seed);
 }

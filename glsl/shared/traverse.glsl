@@ -282,7 +282,7 @@ void intersect_masked(inout Hit hit, RaySpace ray, uint index, uint instance, ui
         passes_near = false;
         if (FX_ALPHA_MASKS && meets) {
             bool on_sphere = FX_SPHERES && (sphere || is_sphere(index));
-            uint seed = on_sphere && far ? mask_seed ^ mask_bits(~0u) : mask_seed;
+            uint seed = on_sphere && far ? mask_seed ^ MASK_HASH : mask_seed;
             meets = mask_blocks(index, instance, barycentric, ray.direction, seed);
             passes_near = on_sphere && !far && !meets;
             far = true;

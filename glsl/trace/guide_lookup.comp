@@ -64,12 +64,11 @@ void main() {
         uint index = push.first_sample + k;
         Sampler random = sampler_start(pixel, index, push.constants.seed);
         vec2 film = film_sample(pixel, random);
-        uint mask_seed = pcg(path_seed(pixel, index));
         Ray ray = eye_ray(film, random);
         Guide first;
         Hit hit;
         vec3 albedo;
-        Guide eye = seen_hit(ray, mask_seed, first, hit, albedo);
+        Guide eye = seen_hit(ray, path_seed(pixel, index), first, hit, albedo);
         if (albedo == vec3(0.0)) continue;
         uint chosen = most_similar(eye, film);
         if (chosen != NONE) sum += albedo * known_radiance(texelFetch(filtered, int(chosen))).rgb;

@@ -64,8 +64,7 @@ void main() {
     Guide shown;
     ThroughLens sum = ThroughLens(Guide_zero(), 0u, 0.0);
     uint k = 0u;
-    // The lowest bit of a seed of masks has a meaning of its own, so that seeds are two apart. The first ray is that through the middle
-    // of the lens. Rays are traced in one place, in a loop that is tested at its end: see shared/first_hit.glsl and shared/traverse.glsl.
+    // The first ray is that through the middle of the lens. Rays are traced in one place, in a loop that is tested at its end: see shared/first_hit.glsl and shared/traverse.glsl.
     do {
         Camera lens = camera;
         lens.lens_radius = k == 0u ? 0.0 : camera.lens_radius;
@@ -73,7 +72,7 @@ void main() {
         Guide guide;
         Hit hit;
         vec3 kept;
-        Guide seen_here = seen_hit(ray, pcg(pixel) + 2u * k, guide, hit, kept);
+        Guide seen_here = seen_hit(ray, STRONGER_WAY, guide, hit, kept);
         if (k == 0u) {
             shown = seen_here;
             guides[i] = guide;

@@ -1,6 +1,5 @@
 //! Twin of `glsl/trace/guide_lookup.comp`.
 use crate::layout::{Guide, vec3, vec4};
-use crate::math::hash::pcg;
 use crate::shaders::guide_lookup::{MIN_DEPTH_DIFFERENCE, MIN_NORMAL_DIFFERENCE};
 use crate::shaders::shared::sanitise::LARGEST;
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
@@ -67,7 +66,7 @@ pub fn eye_hit(tracer: &Tracer, pixel: u32, index: u32) -> Option<(SeenHit, Vec2
     let random = sampler_start(pixel, index, frame.path.seed, effects.independent_sampler);
     let film = film_sample(frame, effects, pixel, random);
     let ray = eye_ray(frame, effects, film, random);
-    let eye = seen_hit(scene, frame, &ray, pcg(path_seed(frame, pixel, index)));
+    let eye = seen_hit(scene, frame, &ray, path_seed(frame, effects, pixel, index));
     (eye.kept != Vec3::ZERO).then_some((eye, film))
 }
 

@@ -2,7 +2,6 @@
 use crate::layout::{
     BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, FrameConstants, MATERIAL_EMITS_BEHIND, NONE, PathConstants, SurfacePoint,
 };
-use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::shaders::shared::light::SHARP_PROBABILITY;
 use crate::shaders::shared::path_step::{
@@ -24,7 +23,7 @@ use glam::Vec3;
 
 pub use crate::shaders::shared::path_step::SHADOW_END;
 use crate::shaders::shared::segment::PASSES_WALLS;
-use crate::twins::texture::mask_bits;
+use crate::twins::texture::mask_seed;
 
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] and [`Effects::soft_light`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -290,11 +289,11 @@ impl Tracer<'_> {
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
-            let mask_seed = mask_bits(pcg(seed.wrapping_add(2 * bounce)));
+            let on_way = mask_seed(seed, 2 * bounce);
             rays += 1;
             let hit = match bounce {
                 0 => first,
-                _ => traverse_from(self.scene, from, path.origin, path.direction, mask_seed),
+                _ => traverse_from(self.scene, from, path.origin, path.direction, on_way),
             };
             let kind = kind_of_light(&seen, false);
             if !hit.any() {
@@ -314,7 +313,7 @@ impl Tracer<'_> {
             let ends = sharp_only && seen.scattered > u32::from(!soft);
             if self.frame.path.light_count > 0 && !smooth_here {
                 let SampledLight { brought, sharp, chosen } =
-                    self.light_from_nee(&p, random, mask_seed.wrapping_add(2));
+                    self.light_from_nee(&p, random, mask_seed(seed, 2 * bounce + 1));
                 let is_sharp = sharp >= SHARP_PROBABILITY;
                 let brought = brought.filter(|_| !ends || (soft && is_sharp));
                 rays += u32::from(brought.is_some());
@@ -350,8 +349,8 @@ impl Tracer<'_> {
         let random = sampler_start(pixel, index, self.frame.path.seed, self.effects.independent_sampler);
         let film = film_sample(&self.frame, &self.effects, pixel, random);
         let ray = eye_ray(&self.frame, &self.effects, film, random);
-        let seed = path_seed(&self.frame, pixel, index);
-        let first = traverse(self.scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_bits(pcg(seed)));
+        let seed = path_seed(&self.frame, &self.effects, pixel, index);
+        let first = traverse(self.scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_seed(seed, 0));
         let PathConstants { size: [width, _], indirect_stride, .. } = self.frame.path;
         let sharp_only = [pixel % width, pixel / width].iter().any(|at| !at.is_multiple_of(indirect_stride.max(1)));
         let sample = self.trace_path(Path::new(ray.origin, ray.direction), sharp_only, first, random, seed);
@@ -367,7 +366,7 @@ impl Tracer<'_> {
         hit.t = off.length();
         let random = sampler_start(0, index, self.frame.path.seed, self.effects.independent_sampler);
         let path = Path::new(eye, off / hit.t.max(1e-37));
-        self.trace_path(path, false, hit, random, path_seed(&self.frame, 0, index))
+        self.trace_path(path, false, hit, random, path_seed(&self.frame, &self.effects, 0, index))
     }
 }
 

@@ -1,26 +1,27 @@
 //! Twin of `glsl/trace/primary_hit.comp` and of `glsl/shared/first_hit.glsl`.
 use crate::layout::{Camera, FrameConstants, Guide, NONE, SurfacePoint};
-use crate::math::hash::{pcg, unit_interval};
+use crate::math::hash::unit_interval;
 use crate::scene::Scene;
 use crate::shaders::primary_hit::LENS_RAYS;
+use crate::shaders::shared::segment::STRONGER_WAY;
 use crate::twins::bsdf::{bsdf_albedo, bsdf_chooses, bsdf_is_delta, bsdf_sample};
 use crate::twins::camera::{Ray, camera_ray, film_from_pixel, lens_blur};
 use crate::twins::light::INFINITE_DISTANCE;
 use crate::twins::surface::{View, facing_of, light_share, side_of, surface_at, surface_bsdf, view_of};
-use crate::twins::texture::mask_bits;
+use crate::twins::texture::mask_seed;
 use crate::twins::traverse::{Hit, traverse};
 use glam::{Vec2, Vec3, vec2};
 
 /// The primary hit through the centre of `pixel` (row-major), from the middle of the lens.
 pub fn guide(scene: &Scene, frame: &FrameConstants, pixel: u32) -> Guide {
     let ray = centre_ray(frame, pixel);
-    first_hit(scene, frame, &ray, pcg(pixel)).guide
+    first_hit(scene, frame, &ray, STRONGER_WAY).guide
 }
 
 /// What the ray through the centre of `pixel` shows: that hit or, where it is smooth, what is seen in it.
 pub fn seen(scene: &Scene, frame: &FrameConstants, pixel: u32) -> Guide {
     let ray = centre_ray(frame, pixel);
-    seen_hit(scene, frame, &ray, pcg(pixel)).guide
+    seen_hit(scene, frame, &ray, STRONGER_WAY).guide
 }
 
 /// The mean of what rays through the lens show at the centre of `pixel`, and how far the lens blurs it.
@@ -31,8 +32,7 @@ pub fn through_lens(scene: &Scene, frame: &FrameConstants, pixel: u32) -> (Guide
     for k in 0..LENS_RAYS {
         let point = vec2((k as f32 + 0.5) / LENS_RAYS as f32, unit_interval(k.reverse_bits()));
         let ray = camera_ray(&frame.camera, film, point);
-        let Guide { normal, position, albedo, depth, .. } =
-            seen_hit(scene, frame, &ray, pcg(pixel).wrapping_add(2 * (k + 1))).guide;
+        let Guide { normal, position, albedo, depth, .. } = seen_hit(scene, frame, &ray, STRONGER_WAY).guide;
         let distance = if depth > 0.0 { depth } else { INFINITE_DISTANCE };
         blur += lens_blur(&frame.camera, distance * ray.direction.dot(frame.camera.forward.into()), frame.path.size);
         if depth > 0.0 {
@@ -58,7 +58,7 @@ pub fn through_lens(scene: &Scene, frame: &FrameConstants, pixel: u32) -> (Guide
 /// The point of that hit.
 pub fn point(scene: &Scene, frame: &FrameConstants, pixel: u32) -> SurfacePoint {
     let ray = centre_ray(frame, pixel);
-    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_bits(pcg(pixel)));
+    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, STRONGER_WAY);
     let weights = hit.barycentric.into();
     SurfacePoint { triangle: hit.triangle, instance: hit.instance, weights, ..Default::default() }
 }
@@ -80,7 +80,7 @@ struct FirstHit {
 }
 
 fn first_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u32) -> FirstHit {
-    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_bits(mask_seed));
+    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_seed);
     if !hit.any() {
         return FirstHit { guide: Guide { object: NONE, material: NONE, ..Guide::default() }, hit };
     }
@@ -141,8 +141,8 @@ impl Sight {
 }
 
 /// What a primary ray shows, behind smooth surfaces.
-pub fn seen_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u32) -> SeenHit {
-    let FirstHit { mut guide, mut hit } = first_hit(scene, frame, ray, mask_seed);
+pub fn seen_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, seed: u32) -> SeenHit {
+    let FirstHit { mut guide, mut hit } = first_hit(scene, frame, ray, mask_seed(seed, 0));
     let way = Ray { origin: ray.origin, direction: ray.direction };
     let mut sight = Sight { way, throughput: Vec3::ONE, albedo: Vec3::ZERO, chosen: false };
     let mut length = 0.0;
@@ -151,7 +151,7 @@ pub fn seen_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u32
             break;
         }
         length += hit.t;
-        FirstHit { guide, hit } = first_hit(scene, frame, &sight.way, pcg(mask_seed.wrapping_add(bounce)));
+        FirstHit { guide, hit } = first_hit(scene, frame, &sight.way, mask_seed(seed, 2 * bounce));
         let (sky, behind) = (!hit.any(), if hit.any() { hit.t } else { 0.0 });
         if sky {
             guide.normal = (-sight.way.direction).into();

@@ -5,7 +5,8 @@ use crate::math::octahedral::octahedral_vector;
 use crate::scene::Scene;
 use crate::scene::attributes::Attributes;
 pub use crate::scene::lookup::texture_sample;
-use crate::shaders::shared::segment::PASSES_WALLS;
+use crate::shaders::shared::segment::{BY_CHANCE, MASK_HASH, MASK_INDEX, PASSES_WALLS};
+use crate::twins::sampler::owen_reversed;
 use crate::twins::scene::{material_of, object_from_world, texture_coordinates, world_from_object};
 use glam::{Vec2, Vec3, Vec4};
 
@@ -72,7 +73,21 @@ pub fn mask_bits(word: u32) -> u32 {
     word & !PASSES_WALLS
 }
 
-/// What a partly transparent surface leaves of a ray's light. It stops a ray or lets it pass, decided by a hash of `seed`, but for
+/// What decides about masks on way number `way` of a path with this `seed`: two for each bounce, to its surface and from there to a light.
+pub fn mask_seed(seed: u32, way: u32) -> u32 {
+    (seed & (MASK_INDEX | BY_CHANCE)) | (pcg((seed & MASK_HASH) ^ (way << 16)) & MASK_HASH)
+}
+
+/// The number in [0, 1) that a surface's opacity is compared with: over the samples of a pixel a dimension of the sampler.
+fn mask_number(triangle: u32, instance: u32, seed: u32) -> f32 {
+    let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
+    match seed & BY_CHANCE {
+        0 => 0.5,
+        _ => unit_interval(owen_reversed(seed & MASK_INDEX, pcg(surface ^ (seed & MASK_HASH)))),
+    }
+}
+
+/// What a partly transparent surface leaves of a ray's light. It stops a ray or lets it pass, decided by `seed`, but for
 /// clear walls and constant opacities, which dim the light of shadow rays. `direction` is that of the ray in the space of the triangle.
 pub fn mask_leaves(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec2, direction: Vec3, seed: u32) -> Vec3 {
     let number = material_of(scene, triangle, instance);
@@ -86,7 +101,47 @@ pub fn mask_leaves(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec
             return 1.0 - opacity * (1.0 - share.unwrap_or_default());
         }
     }
-    let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
-    let blocks = opacity > unit_interval(pcg(seed ^ surface));
-    if blocks { Vec3::ZERO } else { Vec3::ONE }
+    if opacity > mask_number(triangle, instance, seed) { Vec3::ZERO } else { Vec3::ONE }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seeds of one pixel, number `hash`.
+    fn seed(hash: u32, index: u32) -> u32 {
+        (index.reverse_bits() & MASK_INDEX) | ((hash << 2) & MASK_HASH) | BY_CHANCE
+    }
+
+    #[test]
+    fn masks_are_stratified_over_the_samples_of_a_pixel() {
+        for (hash, first) in [(0, 0), (1, 0), (77, 64), (16383, 4096)] {
+            let number = |index| mask_number(5, NONE, mask_seed(seed(hash, index), 3));
+            let mut numbers: Vec<f32> = (first..first + 64).map(number).collect();
+            numbers.sort_by(f32::total_cmp);
+            for (stratum, &u) in numbers.iter().enumerate() {
+                assert_eq!((64.0 * u) as usize, stratum, "{hash}, {first}: {u}");
+            }
+        }
+    }
+
+    /// One number in 16 of each of two surfaces, ways or pixels: a table of 256 cells. With 16384 samples a cell holds 64, give or take 8.
+    #[test]
+    fn surfaces_ways_and_pixels_decide_independently() {
+        let cell = |u: f32| (16.0 * u) as usize;
+        let pairs: [(&str, fn(u32) -> [f32; 2]); 4] = [
+            ("surfaces", |i| [5, 6].map(|triangle| mask_number(triangle, NONE, mask_seed(seed(9, i), 0)))),
+            ("instances", |i| [0, 1].map(|instance| mask_number(5, instance, mask_seed(seed(9, i), 0)))),
+            ("ways", |i| [0, 1].map(|way| mask_number(5, NONE, mask_seed(seed(9, i), way)))),
+            ("pixels", |i| [i, i + 1].map(|pixel| mask_number(5, NONE, mask_seed(seed(pixel, 3), 0)))),
+        ];
+        for (what, numbers) in pairs {
+            let mut counts = [0.0f64; 256];
+            for [a, b] in (0..16384).map(numbers) {
+                counts[16 * cell(a) + cell(b)] += 1.0;
+            }
+            let chi_square: f64 = counts.iter().map(|n| (n - 64.0) * (n - 64.0) / 64.0).sum();
+            assert!(chi_square < 255.0 + 5.0 * 22.6, "{what}: {chi_square}"); // five standard deviations of 255 degrees of freedom
+        }
+    }
 }

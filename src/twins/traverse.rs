@@ -2,11 +2,11 @@
 use crate::layout::{BvhNode, NONE, TRAVERSAL_STACK};
 use crate::math::octahedral::octahedral_point;
 use crate::scene::Scene;
-use crate::shaders::shared::segment::{INFINITE_DISTANCE, WALL_END, WALL_HALVING};
+use crate::shaders::shared::segment::{INFINITE_DISTANCE, MASK_HASH, WALL_END, WALL_HALVING};
 use crate::shaders::shared::traverse::SLAB_ROUNDING;
 use crate::twins::scene::{object_from_world, triangle_vertices};
 use crate::twins::sphere::Sphere;
-use crate::twins::texture::{mask_bits, mask_leaves};
+use crate::twins::texture::mask_leaves;
 use glam::{UVec3, Vec2, Vec3, vec2, vec3};
 
 /// Where a ray meets the scene.
@@ -213,7 +213,7 @@ impl Traversal<'_> {
         let leaves = [index, self.instance] == self.from;
         let before_end = |t: f32| t > 0.0 && t < self.hit.t;
         let (enters, ends) = (!leaves && before_end(near.0), before_end(far.0));
-        let seeds = [self.mask_seed, self.mask_seed ^ mask_bits(u32::MAX)];
+        let seeds = [self.mask_seed, self.mask_seed ^ MASK_HASH];
         let places = [near.1, far.1].map(octahedral_point);
         let side = match enters && self.is_stopped(index, places[0], seeds[0]) {
             true => 0,

@@ -18,7 +18,7 @@ fn rays(scene: &Loaded) -> Vec<RayQuery> {
         origin: (low + (high - low) * (1.4 * point(w) - 0.2)).into(),
         t_max: if i.is_multiple_of(5) { 0.3 * (high - low).length() } else { 3e38 },
         direction: (point(&w[3..]) - 0.5).normalize().into(),
-        mask_seed: i as u32,
+        mask_seed: (i as u32).wrapping_mul(0x9e3779b9),
         ..Default::default()
     };
     words(6 * RAYS as usize, 5).chunks_exact(6).enumerate().map(ray).collect()

@@ -485,7 +485,7 @@ pub fn queries(scene: &Loaded, count: usize) -> Vec<RayQuery> {
             origin: origin.into(),
             t_max,
             direction: direction.into(),
-            mask_seed: i as u32,
+            mask_seed: (i as u32).wrapping_mul(0x9e3779b9),
             ..Default::default()
         }
     };

@@ -226,7 +226,8 @@ fn parse_numbers(line: &str, group: &Option<String>) -> Vec<Number> {
     let number = |item: &str| {
         let (name, value) = item.trim().split_once(" = ")?;
         let value = rust_value(value);
-        value.parse::<f64>().ok()?;
+        let is_hexadecimal = value.strip_prefix("0x").is_some_and(|digits| u32::from_str_radix(digits, 16).is_ok());
+        (is_hexadecimal || value.parse::<f64>().is_ok()).then_some(())?;
         Some(Number { group: group.clone(), name: name.to_owned(), ty, value, comment: comment.clone() })
     };
     list.split(',').filter_map(number).collect()
