@@ -29,6 +29,7 @@ const float MAX_DEVIATION = 1e17, MAX_M2 = 1e35;
 // rounding takes off is kept (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That code takes long to
 // compile, and exists only in renders of so many samples (FX_MANY_SAMPLES).
 const uint MAX_ROUNDED_SAMPLES = 4096u;
+const uint ASTRAY = 0x80000000u; // bit of PixelLight.remainder: all samples took ways that few take
 const int BITS = 10, LIGHT_BITS = 5; // bits of a mean's remainder per channel: of all light, of direct light and of albedo
 
 // Returns where a pixel's samples lie in the batch: (first, step, number).
@@ -78,6 +79,19 @@ void fold_light(inout PixelLight l, vec3 kept, vec3 albedo, float share, uint co
     }
 }
 
+// The albedo of sample number `count`. That of one on a way that few take is not noted: the choice of ways would be seen as noise of
+// the albedo, which no filter takes. It counts as white, until a sample on another way comes.
+vec3 albedo_along(inout PixelLight l, vec4 noted, uint count) {
+    if (!FX_SMOOTH) return noted.rgb;
+    bool astray = noted.w == 1.0, others = count > 1u;
+    if (others && (astray || (l.remainder & ASTRAY) != 0u)) {
+        if (astray) return l.albedo;
+        l.albedo = noted.rgb;
+    }
+    l.remainder = (l.remainder & ~ASTRAY) | (astray ? ASTRAY : 0u);
+    return noted.rgb;
+}
+
 // Adds the sample at `at`. A negative number of rays marks one that is wrong; `first_broken` is the first one's index.
 void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout uint first_broken, int at) {
     vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at);
@@ -87,7 +101,7 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
     float share = 1.0 / float(s.count), other = 0.0, off_other = 0.0;
     if (FX_SPLIT) {
         vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
-        vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
+        vec3 albedo = albedo_along(l, texelFetch(samples, 3 * at + 2), s.count);
         bvec3 kept = lessThanEqual(albedo, vec3(MIN_ALBEDO));
         other = luminance(mix(indirect, vec3(0.0), kept));
         off_other = other - luminance(s.mean - l.direct);

@@ -256,11 +256,17 @@ bool bsdf_is_delta(Bsdf b) {
     return is_kind(FX_METALLIC, b, BSDF_METALLIC) ? metallic_is_delta(b.metallic) : is_interface(b) && is_smooth(b);
 }
 
-// Whether a surface whose every lobe is a delta lets light take one of two ways.
-bool bsdf_chooses(Bsdf b) {
-    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return has_coat(b.metallic) || b.metallic.through != vec3(0.0);
-    return is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC);
+// The probability of the way that bsdf_sample chooses by `u_lobe`, where every lobe is a delta; 1 where light has one way alone.
+float bsdf_chance(Bsdf b, vec3 wo, float u_lobe) {
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return metallic_chance(b.metallic, wo, u_lobe);
+    if (!is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC)) return 1.0;
+    float reflected = fresnel_dielectric(abs(wo.z), relative_index(b, wo.z)).x;
+    return u_lobe < reflected ? reflected : 1.0 - reflected;
 }
+
+// The albedo that a path of this `throughput` keeps of a surface. Where it came a way that it takes with the probability `share`, what
+// lies the other way counts as white. Roulette may leave a throughput above 1.
+vec3 seen_albedo(vec3 throughput, vec3 albedo, float share) { return min(throughput, vec3(1.0)) * mix(vec3(1.0), albedo, share); }
 
 // Whether some lobe leaves on the other side.
 bool bsdf_lets_light_through(Bsdf b) {

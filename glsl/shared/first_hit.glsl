@@ -10,7 +10,7 @@ struct Sight {
     float walked;    // length of the way until its last surface
     vec3 throughput; // what the light from the end of the way is multiplied by
     vec3 albedo;     // as a path keeps it that goes the same way: see path_step.glsl
-    bool chosen;     // whether a surface on the way lets light take one of two, behind which a path keeps its albedo
+    float share;     // probability that a path does
 };
 
 // The hit of `ray` at the surface `s`, as a Guide.
@@ -30,16 +30,15 @@ Guide guide_of(Ray ray, Hit hit, Surface s, Bsdf bsdf) {
 bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
     View view = view_of(s, bsdf, facing_of(s, bsdf, -sight.way.direction), -sight.way.direction);
     bool smooth_here = FX_SMOOTH && bsdf_is_delta(bsdf);
-    if (!sight.chosen) {
-        sight.chosen = smooth_here && bsdf_chooses(bsdf);
-        sight.albedo = min(sight.throughput, vec3(1.0)) * (sight.chosen ? vec3(1.0) : bsdf_albedo(bsdf, view.wo.z));
-    }
+    sight.albedo = seen_albedo(sight.throughput, bsdf_albedo(bsdf, view.wo.z), sight.share);
     if (!smooth_here) return false;
     BsdfSample next;
     bool goes_on = bsdf_sample(bsdf, view.wo, 0.5, vec2(0.5), next);
     sight.way.direction = view.basis * next.wi;
     sight.way.origin = ray_origin(s, sight.way.direction);
     sight.throughput *= next.weight * light_share(s, view.facing, sight.way.direction, next.wi.z);
+    sight.share *= bsdf_chance(bsdf, view.wo, 0.5);
+    if (sight.share < 1.0) sight.albedo = seen_albedo(sight.throughput, vec3(1.0), 1.0);
     return goes_on && largest_channel(sight.throughput) > 0.0;
 }
 
@@ -48,7 +47,7 @@ bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
 // the light from there is multiplied by on its way. `first` becomes the first hit, smooth or not, and `kept` the albedo that paths
 // keep which begin like this: 1 times the throughput where they choose a way, since their light is then that of either.
 Guide seen_hit(Ray ray, uint seed, out Guide first, out Hit first_hit, out vec3 kept) {
-    Sight sight = Sight(ray, 0.0, vec3(1.0), vec3(0.0), false);
+    Sight sight = Sight(ray, 0.0, vec3(1.0), vec3(0.0), 1.0);
     Guide seen;
     bool on;
     uint bounce = 0u;

@@ -194,6 +194,14 @@ bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out
     return above;
 }
 
+// The probability of the lobe that metallic_sample chooses.
+float metallic_chance(Metallic b, vec3 wo, float u_lobe) {
+    vec4 odds = metallic_odds(b, wo);
+    if (u_lobe < odds.x) return odds.x;
+    if (FX_THIN && u_lobe < odds.x + odds.w) return odds.w;
+    return u_lobe < odds.x + odds.w + odds.y ? odds.y : odds.z;
+}
+
 // Approximate reflectance at the cosine `c`.
 vec3 metallic_albedo(Metallic b, float c) {
     float inner = has_coat(b) ? coat_lets_in(b, c) : 1.0;

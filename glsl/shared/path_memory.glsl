@@ -14,14 +14,13 @@ const uint SAMPLED = 5u;        // any-hit rays
 const uint HIT = 6u;            // four words of the hit
 const uint DIRECT_LIGHT = 7u;   // closest-hit rays
 const uint INDIRECT_LIGHT = 8u; // distance of the hit
-const uint ALBEDO = 9u;
+const uint ALBEDO = 9u;         // probability of the way
 const uint SOFT_LIGHT = 10u;
 const uint KINDS = 11u;
 
-// Bits of the state: the path waits for a shadow ray, and for one to its next surface; it leaves a smooth surface; one before let it
-// take one of two ways; the light of its shadow ray is sharp; that ray passes clear walls. Then surfaces that are not smooth, up to
-// 2, and all surfaces.
-const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, CHOSEN = 8u, SHARP = 16u, PASSING = 32u, SCATTERED_AT = 6u, BOUNCE_AT = 8u;
+// Bits of the state: the path waits for a shadow ray, and for one to its next surface; it leaves a smooth surface; the light of
+// its shadow ray is sharp; that ray passes clear walls. Then surfaces that are not smooth, up to 2, and all surfaces.
+const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, SHARP = 8u, PASSING = 16u, SCATTERED_AT = 5u, BOUNCE_AT = 7u;
 
 uint place_of(uint kind, uint i) { return kind * path_count() + i; }
 
@@ -44,8 +43,7 @@ void save_hit(uint i, Hit hit) {
 }
 
 void save_path(uint i, PathState p, Departure d) {
-    uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) | (p.chosen ? CHOSEN : 0u) |
-                 (d.sharp ? SHARP : 0u) | ((d.shadow.mask_seed & PASSES_WALLS) != 0u ? PASSING : 0u) |
+    uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) | (d.sharp ? SHARP : 0u) | ((d.shadow.mask_seed & PASSES_WALLS) != 0u ? PASSING : 0u) |
                  min(p.scattered, 2u) << SCATTERED_AT | p.bounce << BOUNCE_AT;
     keep(ORIGIN, i, p.path.origin, floatBitsToUint(p.path.bsdf_pdf));
     keep(DIRECTION, i, p.path.direction, floatBitsToUint(p.path.eta_scale));
@@ -56,7 +54,7 @@ void save_path(uint i, PathState p, Departure d) {
     keep(DIRECT_LIGHT, i, p.light.direct, p.closest_rays);
     keep(INDIRECT_LIGHT, i, p.light.indirect, 0u);
     save_hit(i, p.hit);
-    if (FX_SPLIT) keep(ALBEDO, i, p.albedo, 0u);
+    if (FX_SPLIT) keep(ALBEDO, i, p.albedo, floatBitsToUint(p.share));
     if (FX_SOFT) keep(SOFT_LIGHT, i, p.light.soft, 0u);
 }
 
@@ -70,13 +68,14 @@ PathState saved_path(uint i, out Departure d) {
     p.path.bsdf_pdf = uintBitsToFloat(pdf);
     p.path.eta_scale = uintBitsToFloat(scale);
     p.path.delta = (state & SMOOTH) != 0u;
-    p.chosen = (state & CHOSEN) != 0u;
     p.scattered = state >> SCATTERED_AT & 3u;
     p.bounce = state >> BOUNCE_AT;
     p.light.direct = kept(DIRECT_LIGHT, i, p.closest_rays);
     p.light.indirect = kept(INDIRECT_LIGHT, i, t);
     p.light.soft = FX_SOFT ? kept(SOFT_LIGHT, i) : vec3(0.0);
-    p.albedo = FX_SPLIT ? kept(ALBEDO, i) : vec3(0.0);
+    uint share = floatBitsToUint(1.0);
+    p.albedo = FX_SPLIT ? kept(ALBEDO, i, share) : vec3(0.0);
+    p.share = uintBitsToFloat(share);
     uvec4 hit = memory[place_of(HIT, i)];
     p.hit = Hit(uintBitsToFloat(t), hit.x, hit.y, uintBitsToFloat(hit.z), uintBitsToFloat(hit.w));
     p.seed = memory[place_of(SHADOW, i)].w;

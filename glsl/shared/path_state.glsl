@@ -48,10 +48,10 @@ struct PathState {
     bool sharp_only; // ends where no light but such as a filter takes can come any more: the filter fills that in
     uint bounce;     // surfaces that it has left
     uint scattered;  // those of them that are not smooth
-    bool chosen;     // a smooth one before these let it take one of two ways
+    float share;     // probability of its way, where smooth ones before these let it take one of two: 0 beyond one less likely than not
     uint closest_rays, any_rays;
     SplitLight light;
-    vec3 albedo;
+    vec3 albedo;     // what light is multiplied by on its way from what the path sees: see `note_albedo`
 };
 
 // The rays that leave a surface: whether there is the one towards a light, with what comes along it if nothing blocks it, and
@@ -70,7 +70,7 @@ struct Departure {
 PathState path_state(vec3 origin, vec3 direction, bool sharp_only, uint seed) {
     SplitLight none = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
     Path path = Path(origin, direction, vec3(1.0), 0.0, true, 1.0);
-    return PathState(path, Hit(0.0, NONE, NONE, 0.0, 0.0), seed, sharp_only, 0u, 0u, false, 1u, 0u, none, vec3(0.0));
+    return PathState(path, Hit(0.0, NONE, NONE, 0.0, 0.0), seed, sharp_only, 0u, 0u, 1.0, 1u, 0u, none, vec3(0.0));
 }
 
 
@@ -81,7 +81,7 @@ Segment next_segment(PathState p) {
 
 // Adds what was sampled at the surface that the path has left, where nothing blocks it.
 void add_sampled(inout PathState p, vec3 sampled, bool lit, bool sharp) {
-    add_light(p.light, lit ? sampled : vec3(0.0), kind_of_light(p.scattered, sharp, p.chosen));
+    add_light(p.light, lit ? sampled : vec3(0.0), kind_of_light(p.scattered, sharp, p.share < 1.0));
 }
 
 // The light of a path that has ended.

@@ -101,7 +101,7 @@ bool survives_roulette(inout Path path, Sampler random, uint pair) {
 
 // Adds the light that the path meets at its hit. Returns whether it can go on from the surface `s`: the last one samples no light.
 bool arrive(inout PathState p, out Surface s) {
-    uint kind = kind_of_light(p.scattered, false, p.chosen);
+    uint kind = kind_of_light(p.scattered, false, p.share < 1.0);
     if (p.hit.triangle == NONE) {
         add_light(p.light, p.path.throughput * light_from_miss(p.path), kind);
         return false;
@@ -119,15 +119,18 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     Bsdf bsdf = surface_bsdf(s);
     View view = view_of(s, bsdf, facing_of(s, bsdf, -p.path.direction), -p.path.direction);
     bool smooth_here = bsdf_is_delta(bsdf);
-    if (p.scattered == 0u && !p.chosen && going) {
-        p.chosen = smooth_here && bsdf_chooses(bsdf);
-        p.albedo = min(p.path.throughput, vec3(1.0)) * (p.chosen ? vec3(1.0) : bsdf_albedo(bsdf, view.wo.z)); // roulette may exceed 1
-    }
+    bool sees = p.scattered == 0u && p.share > 0.0 && going;
+    if (sees) p.albedo = seen_albedo(p.path.throughput, bsdf_albedo(bsdf, view.wo.z), p.share);
     uint seed = shadow_mask_seed(p.seed, p.bounce);
     d.sampled = p.path.throughput * light_from_nee(s, bsdf, view, random, pair, seed, d.shadow, d.certainty, d.chosen);
     d.sharp = d.certainty >= SHARP_PROBABILITY;
     d.shadowed = going && push.constants.light_count > 0u && !smooth_here && largest_channel(d.sampled) > 0.0;
     d.alive = scatter(p.path, s, bsdf, view, random, pair) && going;
+    if (sees && smooth_here) {
+        float chance = bsdf_chance(bsdf, view.wo, sample_2d(random, pair + PAIR_CHOICE).y);
+        p.share *= chance < 0.5 ? 0.0 : chance;
+        if (p.share < 1.0) p.albedo = seen_albedo(p.path.throughput, vec3(1.0), 1.0);
+    }
     p.scattered += smooth_here ? 0u : 1u;
     // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for what is sharp there.
     bool ends = FX_SPARSE && p.sharp_only && p.scattered > (FX_SOFT ? 0u : 1u);

@@ -23,7 +23,7 @@ void trace_path(inout PathState p, bool on, Sampler random) {
         else p.hit = trace_shadow_then_closest(d.shadow, d.shadowed, next, d.alive, push.constants.root, from);
         vec3 sampled = behind_walls(d.sampled);
         add_sampled(p, sampled, lit && !d.shadowed, d.sharp);
-        if (p.scattered == 1u && certain_choice == NONE && !p.chosen && push.constants.light_count > 0u) {
+        if (p.scattered == 1u && certain_choice == NONE && p.share == 1.0 && push.constants.light_count > 0u) {
             certain_choice = d.chosen;
             certain_light = lit && !d.shadowed ? d.certainty * sampled : vec3(0.0);
         }

@@ -41,9 +41,11 @@ gpu_structs! {
         /// Sum of squared deviations of the luminance of all other light, as [`PixelStats::m2`].
         indirect_m2: float,
         /// Reflectance that all other light has been multiplied by: that of the first hit or, seen in mirrors, of the first that is
-        /// none, times theirs. Clear glass counts as 1, and samples that show emission alone as 0.
+        /// none, times theirs; samples that show emission alone count as 0. Of what clear glass shows, that by the way that most samples
+        /// take, mixed with white by the share of the others.
         albedo: vec3,
-        /// As [`PixelStats::remainder`]: six numbers of 5 bits, in units of 2^-5; those of `direct` are the lowest.
+        /// As [`PixelStats::remainder`]: six numbers of 5 bits, in units of 2^-5; those of `direct` are the lowest. The highest bit is set
+        /// where all samples went ways that few take.
         remainder: uint,
     }
 

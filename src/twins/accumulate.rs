@@ -3,7 +3,7 @@ use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::{pcg, unit_interval};
 use crate::math::srgb::luminance;
 use crate::shaders;
-use crate::shaders::accumulate::{MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
+use crate::shaders::accumulate::{ASTRAY, MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
 use crate::statistics::next_sample;
 use glam::{Vec3, Vec4};
 
@@ -46,7 +46,8 @@ pub fn fold(
                 report(&mut broken, push.tile + pixel as u32, next_sample(&stats[pixel]));
             }
             if split_light {
-                let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec4::from(samples[record + j]).truncate());
+                let [direct, indirect] = [0, 1].map(|j| Vec4::from(samples[record + j]).truncate());
+                let albedo = albedo_along(&mut light[pixel], samples[record + 2].into(), stats[pixel].count + 1);
                 let (split, before) = (split(direct, indirect, albedo), other(&stats[pixel], &light[pixel]));
                 fold_radiance(&mut stats[pixel], direct + indirect);
                 fold_light(&mut light[pixel], &split, stats[pixel].count);
@@ -129,6 +130,19 @@ fn other(s: &PixelStats, l: &PixelLight) -> f32 {
     luminance(Vec3::from(s.mean) - Vec3::from(l.direct))
 }
 
+/// The albedo of sample number `count`, which w of `noted` tells to have gone astray: see the kernel.
+fn albedo_along(l: &mut PixelLight, noted: Vec4, count: u32) -> Vec3 {
+    let astray = noted.w == 1.0;
+    if count > 1 && astray {
+        return l.albedo.into();
+    }
+    if count > 1 && l.remainder & ASTRAY != 0 {
+        l.albedo = noted.truncate().into();
+    }
+    l.remainder = (l.remainder & !ASTRAY) | if astray { ASTRAY } else { 0 };
+    noted.truncate()
+}
+
 fn fold_light(l: &mut PixelLight, s: &Split, count: u32) {
     let share = 1.0 / count as f32;
     let (direct, albedo) = (Vec3::from(l.direct), Vec3::from(l.albedo));
@@ -162,6 +176,23 @@ mod tests {
     fn light_without_albedo_stays_direct() {
         let s = split(Vec3::ONE, Vec3::splat(2.0), glam::vec3(0.5, 0.0, 1.0));
         assert_eq!((s.kept, s.other), (glam::vec3(1.0, 3.0, 1.0), glam::vec3(2.0, 0.0, 2.0)));
+    }
+
+    #[test]
+    fn ways_that_few_samples_take_do_not_count() {
+        let stray = |albedo: f32| [[0.0; 4], [1.0; 4], [albedo, albedo, albedo, 1.0]];
+        let usual = |albedo: f32| [[0.0; 4], [1.0; 4], [albedo, albedo, albedo, 0.0]];
+        for (samples, albedo, alone) in [
+            (vec![stray(0.9), stray(1.0)], 0.9, true),
+            (vec![stray(0.9), stray(1.0), usual(0.25), stray(1.0)], 0.25, false),
+            (vec![usual(0.25), usual(0.75), stray(1.0)], 0.5, false),
+        ] {
+            let (mut stats, mut light) = ([PixelStats::default()], [PixelLight::default()]);
+            for sample in &samples {
+                fold(&FoldPush { pixels: 1, samples: 1, ..FoldPush::default() }, true, sample, &mut stats, &mut light);
+            }
+            assert_eq!((light[0].albedo, light[0].remainder != 0), ([albedo; 3], alone), "{samples:?}");
+        }
     }
 
     #[test]

@@ -338,12 +338,22 @@ pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     }
 }
 
-/// Whether a surface whose every lobe is a delta lets light take one of two ways.
-pub fn bsdf_chooses(b: &Bsdf) -> bool {
+/// The probability of the way that [`bsdf_sample`] chooses by `u_lobe`, where every lobe is a delta; 1 where light has one way alone.
+pub fn bsdf_chance(b: &Bsdf, wo: Vec3, u_lobe: f32) -> f32 {
     match b.kind {
-        BSDF_METALLIC => b.metallic.chooses(),
-        _ => b.kind == BSDF_DIELECTRIC,
+        BSDF_METALLIC => b.metallic.chance(wo, u_lobe),
+        BSDF_DIELECTRIC => {
+            let reflected = fresnel_dielectric(wo.z.abs(), relative_index(b, wo.z)).x;
+            if u_lobe < reflected { reflected } else { 1.0 - reflected }
+        }
+        _ => 1.0,
     }
+}
+
+/// The albedo that a path of this `throughput` keeps of a surface. Where it came a way that it takes with the probability `share`, what
+/// lies the other way counts as white.
+pub fn seen_albedo(throughput: Vec3, albedo: Vec3, share: f32) -> Vec3 {
+    throughput.min(Vec3::ONE) * Vec3::ONE.lerp(albedo, share)
 }
 
 /// Whether some lobe leaves on the other side.

@@ -224,6 +224,17 @@ impl Metallic {
         LobeSample { wi, weight: Vec3::splat(weight), delta, scattered: own.z.min(wi.z) > GRAZING }
     }
 
+    /// The probability of the lobe that [`Self::sample`] chooses.
+    pub fn chance(&self, wo: Vec3, u_lobe: f32) -> f32 {
+        let [coat, specular, diffuse, through] = self.odds(wo).to_array();
+        match u_lobe {
+            u if u < coat => coat,
+            u if u < coat + through => through,
+            u if u < coat + through + specular => specular,
+            _ => diffuse,
+        }
+    }
+
     /// Approximate reflectance at the cosine `c`.
     pub fn albedo(&self, c: f32) -> Vec3 {
         let inner = self.coat_lets_in(c);
@@ -235,11 +246,6 @@ impl Metallic {
     pub fn specular(&self) -> f32 {
         let (f0, base) = (self.f0.element_sum(), (self.diffuse + self.through).element_sum());
         f0 / (f0 + base).max(1e-10)
-    }
-
-    /// Whether light takes one of two ways where every lobe is a delta.
-    pub fn chooses(&self) -> bool {
-        self.coat != 0.0 || self.through != Vec3::ZERO
     }
 
     /// Whether every lobe is a delta.

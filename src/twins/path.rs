@@ -9,8 +9,8 @@ use crate::shaders::shared::path_step::{
     PAIRS_PER_BOUNCE,
 };
 use crate::twins::bsdf::{
-    Bsdf, bsdf_albedo, bsdf_chooses, bsdf_evaluate, bsdf_gloss, bsdf_is_delta, bsdf_lets_light_through, bsdf_sample,
-    relative_index,
+    Bsdf, bsdf_albedo, bsdf_chance, bsdf_evaluate, bsdf_gloss, bsdf_is_delta, bsdf_lets_light_through, bsdf_sample,
+    relative_index, seen_albedo,
 };
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
@@ -34,6 +34,8 @@ pub struct PathSample {
     pub indirect: Vec3,
     /// What that radiance has been multiplied by: see [`crate::layout::PixelLight::albedo`].
     pub albedo: Vec3,
+    /// Whether smooth surfaces sent it a way that few paths take: that albedo is not what the pixel shows.
+    pub astray: bool,
     /// What the light that was chosen at the first surface that is not smooth brings there, times the probability of that choice, if it has
     /// no extent.
     pub certain: Vec3,
@@ -84,7 +86,7 @@ struct SampledLight {
 /// As `kind_of_light` of the kernel.
 fn kind_of_light(seen: &Seen, sharp: bool) -> Kind {
     match seen.scattered {
-        0 if seen.chosen => Kind::Soft,
+        0 if seen.share < 1.0 => Kind::Soft,
         0 => Kind::Direct,
         1 if sharp => Kind::Direct,
         1 => Kind::Soft,
@@ -93,26 +95,34 @@ fn kind_of_light(seen: &Seen, sharp: bool) -> Kind {
 }
 
 /// What a path has met.
-#[derive(Default)]
 struct Seen {
     /// Surfaces that are not smooth.
     scattered: u32,
-    /// Whether a smooth one before them let light take one of two ways.
-    chosen: bool,
-    /// What their light has been multiplied by when it reaches the camera; 1 for what is seen in one that chooses.
+    /// Probability of the path's way, where smooth ones before them let it take one of two: 0 beyond one less likely than not.
+    share: f32,
+    /// What light is multiplied by on its way from what the path sees: see [`seen_albedo`].
     albedo: Vec3,
 }
 
 impl Seen {
-    /// Notes a surface that a path of this throughput leaves.
+    /// Notes a surface that a path of this throughput comes to.
     fn note(&mut self, p: &Shade, throughput: Vec3) {
-        let is_smooth = bsdf_is_delta(&p.bsdf);
-        if self.scattered == 0 && !self.chosen {
-            self.chosen = is_smooth && bsdf_chooses(&p.bsdf);
-            let albedo = if self.chosen { Vec3::ONE } else { bsdf_albedo(&p.bsdf, p.view.wo.z) };
-            self.albedo = throughput.min(Vec3::ONE) * albedo;
+        if self.scattered == 0 && self.share > 0.0 {
+            self.albedo = seen_albedo(throughput, bsdf_albedo(&p.bsdf, p.view.wo.z), self.share);
         }
-        self.scattered += u32::from(!is_smooth);
+        self.scattered += u32::from(!bsdf_is_delta(&p.bsdf));
+    }
+
+    /// Notes the way that a path of this throughput leaves a surface by.
+    fn pass(&mut self, p: &Shade, throughput: Vec3, u_lobe: f32) {
+        if self.scattered > 0 || self.share == 0.0 {
+            return;
+        }
+        let chance = bsdf_chance(&p.bsdf, p.view.wo, u_lobe);
+        self.share *= if chance < 0.5 { 0.0 } else { chance };
+        if self.share < 1.0 {
+            self.albedo = seen_albedo(throughput, Vec3::ONE, 1.0);
+        }
     }
 }
 
@@ -284,7 +294,7 @@ impl Tracer<'_> {
 
     /// `first` is what the path's first ray finds. A path that is `sharp_only` ends where only light can come that a filter takes.
     fn trace_path(&self, mut path: Path, sharp_only: bool, first: Hit, random: Sampler, seed: u32) -> PathSample {
-        let (mut sum, mut rays, mut seen) = (Sum::default(), 0, Seen::default());
+        let (mut sum, mut rays, mut seen) = (Sum::default(), 0, Seen { scattered: 0, share: 1.0, albedo: Vec3::ZERO });
         let (mut certain, mut choice) = (Vec3::ZERO, NONE);
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
@@ -319,11 +329,13 @@ impl Tracer<'_> {
                 rays += u32::from(brought.is_some());
                 let light = path.throughput * brought.unwrap_or_default();
                 self.add_light(&mut sum, light, kind_of_light(&seen, is_sharp));
-                if seen.scattered == 1 && choice == NONE && !seen.chosen {
+                if seen.scattered == 1 && choice == NONE && seen.share == 1.0 {
                     (certain, choice) = (sharp * light, chosen);
                 }
             }
-            if !self.scatter(&mut path, &p, random) || ends {
+            let goes_on = self.scatter(&mut path, &p, random);
+            seen.pass(&p, path.throughput, sample_2d(random, pair + PAIR_CHOICE).y);
+            if !goes_on || ends {
                 break;
             }
             let least = self.frame.path.roulette_depth;
@@ -337,6 +349,7 @@ impl Tracer<'_> {
             direct: sum.direct,
             indirect: if sharp_only { Vec3::ZERO } else { filtered },
             albedo: seen.albedo,
+            astray: seen.share == 0.0,
             certain,
             choice,
             rays,

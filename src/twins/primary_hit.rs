@@ -4,7 +4,7 @@ use crate::math::hash::unit_interval;
 use crate::scene::Scene;
 use crate::shaders::primary_hit::LENS_RAYS;
 use crate::shaders::shared::segment::STRONGER_WAY;
-use crate::twins::bsdf::{bsdf_albedo, bsdf_chooses, bsdf_is_delta, bsdf_sample};
+use crate::twins::bsdf::{bsdf_albedo, bsdf_chance, bsdf_is_delta, bsdf_sample, seen_albedo};
 use crate::twins::camera::{Ray, camera_ray, film_from_pixel, lens_blur};
 use crate::twins::light::INFINITE_DISTANCE;
 use crate::twins::surface::{View, facing_of, light_share, side_of, surface_at, surface_bsdf, view_of};
@@ -112,8 +112,8 @@ struct Sight {
     way: Ray,
     throughput: Vec3,
     albedo: Vec3,
-    /// Whether a surface on the way lets light take one of two, behind which a path keeps its albedo.
-    chosen: bool,
+    /// Probability that a path goes this way.
+    share: f32,
 }
 
 impl Sight {
@@ -124,11 +124,7 @@ impl Sight {
         let facing = facing_of(&s, &bsdf, -self.way.direction);
         let View { facing, basis, wo } = view_of(&s, &mut bsdf, facing, -self.way.direction);
         let smooth_here = bsdf_is_delta(&bsdf);
-        if !self.chosen {
-            self.chosen = smooth_here && bsdf_chooses(&bsdf);
-            let own = if self.chosen { Vec3::ONE } else { bsdf_albedo(&bsdf, wo.z) };
-            self.albedo = self.throughput.min(Vec3::ONE) * own;
-        }
+        self.albedo = seen_albedo(self.throughput, bsdf_albedo(&bsdf, wo.z), self.share);
         if !smooth_here {
             return false;
         }
@@ -136,6 +132,10 @@ impl Sight {
         let direction = basis * next.wi;
         self.way = Ray { origin: s.ray_origin(direction), direction };
         self.throughput *= next.weight * light_share(&s, &facing, direction, next.wi.z);
+        self.share *= bsdf_chance(&bsdf, wo, 0.5);
+        if self.share < 1.0 {
+            self.albedo = seen_albedo(self.throughput, Vec3::ONE, 1.0);
+        }
         sampled && self.throughput.max_element() > 0.0
     }
 }
@@ -144,7 +144,7 @@ impl Sight {
 pub fn seen_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, seed: u32) -> SeenHit {
     let FirstHit { mut guide, mut hit } = first_hit(scene, frame, ray, mask_seed(seed, 0));
     let way = Ray { origin: ray.origin, direction: ray.direction };
-    let mut sight = Sight { way, throughput: Vec3::ONE, albedo: Vec3::ZERO, chosen: false };
+    let mut sight = Sight { way, throughput: Vec3::ONE, albedo: Vec3::ZERO, share: 1.0 };
     let mut length = 0.0;
     for bounce in 1..frame.path.max_depth {
         if !hit.any() || !sight.look_on(scene, &hit) {

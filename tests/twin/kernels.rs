@@ -137,13 +137,18 @@ pub struct Pair {
     light: [Vec<PixelLight>; 2],
 }
 
+/// The albedo of a sample, or what cannot be one where its path went a way that few take.
+fn marked(albedo: Vec3, astray: bool) -> Vec3 {
+    albedo - if astray { 4.0 } else { 0.0 }
+}
+
 /// Direct light, indirect light and albedo of the twin's samples one after the other, and the rays that it traced.
 pub fn twin_samples(scene: &Loaded, effects: Effects) -> (Vec<Vec3>, u32) {
     let frame = frame_constants(scene, &scene.settings).unwrap();
     let (tracer, pixels) = (Tracer { scene, frame, effects, strategy: Strategy::Both }, SIDE * SIDE);
     let sample = |i: u32| tracer.sample(i % pixels, i / pixels);
     let samples: Vec<_> = (0..pixels * SAMPLES).into_par_iter().map(sample).collect();
-    let all = samples.iter().flat_map(|s| [s.direct, s.indirect, s.albedo]).collect();
+    let all = samples.iter().flat_map(|s| [s.direct, s.indirect, marked(s.albedo, s.astray)]).collect();
     (all, samples.iter().map(|s| s.rays).sum())
 }
 
@@ -163,8 +168,10 @@ pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
     let film = renderer.film();
     let words = film.samples.read().unwrap();
     let tile = &film.tiles[0];
-    let device: Vec<_> = words[..3 * (pixels * SAMPLES) as usize].iter().map(|&v| Vec4::from(v).truncate()).collect();
-    let rays: f32 = words[..device.len()].iter().map(|v| v[3]).sum();
+    let words = &words[..3 * (pixels * SAMPLES) as usize];
+    let read = |(i, &v): (usize, &vec4)| marked(Vec4::from(v).truncate(), i % 3 == 2 && v[3] == 1.0);
+    let device: Vec<_> = words.iter().enumerate().map(read).collect();
+    let rays: f32 = words.iter().step_by(3).map(|v| v[3]).sum();
 
     let frame = frame_constants(scene, &scene.settings).unwrap();
     let (host, traced) = twin_samples(scene, *renderer.effects());
@@ -172,7 +179,7 @@ pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
     let (mut stats, mut light) =
         (vec![PixelStats::default(); pixels as usize], vec![PixelLight::default(); pixels as usize]);
     let push_fold = FoldPush { pixels, samples: SAMPLES, ..FoldPush::default() };
-    fold(&push_fold, true, &words, &mut stats, &mut light); // of the device's samples: only rounding may differ
+    fold(&push_fold, true, words, &mut stats, &mut light); // of the device's samples: only rounding may differ
     let shown = if tile.has_seen() { tile.seen.read().unwrap() } else { Vec::new() };
     let blur = if tile.has_blur() { tile.blur.read().unwrap() } else { Vec::new() };
     let lens = renderer.effects().lens;
@@ -327,7 +334,7 @@ fn repeated(pixel: u32, k: u32) -> [vec4; 3] {
 
 /// Statistics after `times` times all repeated samples, in batches of `depth` samples a pixel.
 fn folded(gpu: &Gpu, samples: &[vec4], depth: u32, times: u32) -> (Vec<PixelStats>, Vec<PixelLight>) {
-    let effects = Effects { split_light: true, many_samples: true, ..Effects::default() };
+    let effects = Effects { split_light: true, many_samples: true, smooth_interface: true, ..Effects::default() };
     let thread = gpu.tuning().thread();
     let kernel = Kernel::new(gpu, &fold_kernel::Constants { effects, thread }).unwrap();
     let stats = Buffer::from_slice(gpu, "stats", &[PixelStats::default(); REPEATED as usize]).unwrap();
@@ -357,6 +364,31 @@ fn folded(gpu: &Gpu, samples: &[vec4], depth: u32, times: u32) -> (Vec<PixelStat
 fn exact(samples: &[vec4], pixel: u32, of: impl Fn(&[vec4]) -> f64) -> f64 {
     let own = samples.chunks(3).skip(pixel as usize).step_by(REPEATED as usize);
     own.map(of).sum::<f64>() / f64::from(PERIOD)
+}
+
+/// Of eight pixels one has samples that all went astray, one no such sample, the others some, first, between or last.
+#[test]
+fn ways_that_few_samples_take_are_folded_as_by_the_twin() {
+    let gpu = gpu();
+    const ASTRAY: [u8; REPEATED as usize] = [0b1111, 0, 1, 0b11, 0b1000, 0b1010, 0b0111, 0b110];
+    let sample = |k: u32, pixel: u32| {
+        let mut sample = repeated(pixel, k);
+        sample[2][3] = f32::from(ASTRAY[pixel as usize] >> k & 1);
+        sample
+    };
+    let samples: Vec<vec4> = (0..4).flat_map(|k| (0..REPEATED).flat_map(move |pixel| sample(k, pixel))).collect();
+    let push = FoldPush { pixels: REPEATED, samples: 4, ..FoldPush::default() };
+    let (mut stats, mut light) = (vec![PixelStats::default(); 8], vec![PixelLight::default(); 8]);
+    fold(&push, true, &samples, &mut stats, &mut light);
+    for depth in [1, 3, 4] {
+        let (_, found) = folded(&gpu, &samples, depth, 1);
+        for (pixel, (a, b)) in found.iter().zip(&light).enumerate() {
+            assert!(near(a.albedo, b.albedo, 1e-6) && a.remainder == b.remainder, "{depth}, {pixel}: {a:?}, {b:?}");
+        }
+    }
+    let alone: Vec<_> = light.iter().map(|l| l.remainder != 0).collect();
+    assert_eq!(alone, ASTRAY.map(|bits| bits == 0b1111), "control");
+    assert_silent(&gpu);
 }
 
 #[test]
