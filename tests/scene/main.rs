@@ -1,5 +1,6 @@
 //! Tests scenes from files and from memory: their arrays, and the messages about mistakes.
 mod animation;
+mod baked;
 #[path = "../support/command.rs"]
 mod command;
 mod files;

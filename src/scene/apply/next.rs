@@ -8,7 +8,7 @@ use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
 use crate::scene::build::hierarchy::{check_none_lost, instance, is_speck, reach};
 use crate::scene::build::plan::is_even;
-use crate::scene::build::soft::Placed;
+use crate::scene::build::soft::{Placed, Soft};
 use crate::scene::description::{LightTable, Transform};
 use crate::scene::load::material::{radiance, reflectance};
 use crate::scene::pose::{EnvironmentChange, MaterialChange, Pose, Vertices};
@@ -70,8 +70,8 @@ impl Next {
             return Err(format!("rebuild_above is {}: 0 builds always, infinity never", pose.rebuild_above));
         }
         each_once(pose.meshes.iter().map(|(mesh, _)| *mesh))?;
-        let mut meshes =
-            pose.meshes.iter().map(|(mesh, to)| next_mesh(scene, *mesh, to)).collect::<Checked<Vec<_>>>()?;
+        let meshes = pose.meshes.iter().map(|(mesh, to)| next_meshes(scene, *mesh, to)).collect::<Checked<Vec<_>>>()?;
+        let mut meshes: Vec<_> = meshes.into_iter().flatten().collect();
         meshes.retain(|mesh| pose.rebuild_above == 0.0 || mesh.is_new(scene));
         let materials = next_materials(scene, pose)?;
         let copies = match pose.moves() {
@@ -100,11 +100,18 @@ fn each_once(meshes: impl Iterator<Item = usize>) -> Checked {
     }
 }
 
-fn next_mesh(scene: &Scene, mesh: usize, to: &Vertices) -> Checked<NextMesh> {
-    let found = scene.rig.trees.iter().position(|tree| tree.mesh == Some(mesh) && tree.soft.is_some());
-    let Some((tree, soft)) = found.and_then(|i| Some((i, scene.rig.trees[i].soft.as_ref()?))) else {
-        return Err(format!("mesh {mesh} cannot be deformed: it needs `moving = true`, and triangles"));
-    };
+/// A mesh is stored twice where only some of its instances show the colours of its vertices.
+fn next_meshes(scene: &Scene, mesh: usize, to: &Vertices) -> Checked<Vec<NextMesh>> {
+    let of_mesh = scene.rig.trees.iter().enumerate().filter(|(_, tree)| tree.mesh == Some(mesh));
+    let found = of_mesh.filter_map(|(index, tree)| Some(next_mesh(scene, (index, tree.soft.as_ref()?), (mesh, to))));
+    let found = found.collect::<Checked<Vec<_>>>()?;
+    match found.is_empty() {
+        true => Err(format!("mesh {mesh} cannot be deformed: it needs `moving = true`, and triangles")),
+        false => Ok(found),
+    }
+}
+
+fn next_mesh(scene: &Scene, (tree, soft): (usize, &Soft), (mesh, to): (usize, &Vertices)) -> Checked<NextMesh> {
     let before = &scene.triangles[scene.rig.trees[tree].range.clone()];
     let placed = soft.place(to, before).map_err(|what| format!("mesh {mesh} {what}"))?;
     let bounds = bvh::bounds(&placed.triangles).unwrap_or_default();

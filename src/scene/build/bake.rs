@@ -24,8 +24,8 @@ pub fn bake(sources: &Sources, plan: Plan) -> Plan {
 
 /// All copies as meshes in world space, in the order of what they are copies of.
 fn baked_copies(plan: &Plan) -> Vec<Job> {
-    let order: HashMap<usize, usize> = plan.stored.iter().enumerate().map(|(order, job)| (job.mesh, order)).collect();
-    let mut copies: Vec<_> = plan.copies.iter().map(|copy| (order[&copy.mesh], copy)).collect();
+    let order: HashMap<_, usize> = plan.stored.iter().map(Job::stored_as).zip(0..).collect();
+    let mut copies: Vec<_> = plan.copies.iter().map(|copy| (order[&copy.stored_as()], copy)).collect();
     copies.sort_by_key(|(order, _)| *order);
     let baked = |(order, copy): (usize, &Job)| {
         let stored = plan.stored[order];

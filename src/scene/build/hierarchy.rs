@@ -64,26 +64,27 @@ fn one_level(stored: Vec<Stored>, geometry: &mut Geometry, scene: &mut Scene) {
 
 /// Builds the BVH of a mesh; returns its root.
 fn add_tree(mesh: Stored, bounds: Bounds, geometry: &mut Geometry, scene: &mut Scene) -> u32 {
-    let Stored { mesh, range, mut soft, .. } = mesh;
+    let Stored { job, range, mut soft, .. } = mesh;
     let (root, order) = bvh::build_mesh(geometry, range.clone(), &mut scene.nodes);
     let nodes = root as usize..scene.nodes.len();
     if let Some(soft) = &mut soft {
         soft.order = order;
         soft.cost = soft::refit(&mut scene.nodes, nodes.clone(), &geometry.triangles[range.clone()], &range);
     }
-    scene.rig.trees.push(Tree { mesh, nodes, range, bounds, lit: Vec::new(), soft });
+    scene.rig.trees.push(Tree { mesh: job.map(|job| job.mesh), nodes, range, bounds, lit: Vec::new(), soft });
     root
 }
 
 /// The copies of each stored mesh; world space has itself.
 fn copies_of(sources: &Sources, plan: &Plan, stored: &[Stored]) -> Result<Vec<Vec<Job>>> {
-    let mut copies: HashMap<usize, Vec<Job>> = HashMap::new();
-    plan.copies.iter().for_each(|copy| copies.entry(copy.mesh).or_default().push(*copy));
-    let names = |mesh: &Stored| mesh.mesh.and_then(|m| copies.get(&m)).map_or(0, Vec::len) * mesh.objects.len();
+    let mut copies: HashMap<_, Vec<Job>> = HashMap::new();
+    plan.copies.iter().for_each(|copy| copies.entry(copy.stored_as()).or_default().push(*copy));
+    let names =
+        |mesh: &Stored| mesh.job.and_then(|job| copies.get(&job.stored_as())).map_or(0, Vec::len) * mesh.objects.len();
     let names: u64 = stored.iter().map(|mesh| names(mesh) as u64).sum();
     memory::need(format!("{}: {names} objects", sources.path.display()), names.saturating_mul(BYTES_OF_NAME))?;
     let itself = Job::new(0, DAffine3::IDENTITY);
-    let of = |mesh: &Stored| mesh.mesh.map_or(vec![itself], |mesh| copies.remove(&mesh).unwrap_or_default());
+    let of = |mesh: &Stored| mesh.job.map_or(vec![itself], |job| copies.remove(&job.stored_as()).unwrap_or_default());
     Ok(stored.iter().map(of).collect())
 }
 

@@ -23,12 +23,20 @@ pub struct Job {
     pub placement: u32,
     /// Of a copy, the part of `affine` that is the mesh's own.
     pub own: DAffine3,
+    /// Whether the colours of an OBJ file's vertices are left out, since an instance gives it another material. Such a mesh is stored
+    /// without them, besides the one that its other instances show.
+    pub plain: bool,
 }
 
 impl Job {
     /// A mesh where its table puts it.
     pub fn new(mesh: usize, affine: DAffine3) -> Self {
-        Self { mesh, affine, material: None, exact: false, placement: NONE, own: DAffine3::IDENTITY }
+        Self { mesh, affine, material: None, exact: false, placement: NONE, own: DAffine3::IDENTITY, plain: false }
+    }
+
+    /// What is stored once for all copies of it.
+    pub fn stored_as(&self) -> (usize, bool) {
+        (self.mesh, self.plain)
     }
 }
 
@@ -78,8 +86,10 @@ struct Planner<'s, 'a> {
     named: HashMap<&'a str, usize>,
     /// Names that several meshes have.
     doubled: HashSet<&'a str>,
-    /// By mesh: whether an instance names it.
-    instanced: Vec<bool>,
+    /// By mesh: whether an instance shows it with the colours of its vertices, and whether one does without, see [`Job::plain`].
+    instanced: Vec<[bool; 2]>,
+    /// By mesh: whether its vertices have colours that an instance's material takes the place of.
+    coloured: Vec<bool>,
     /// By mesh: whether it is stored as a sphere so far, and whether its instances stretch it, since rays meet a sphere in its
     /// own space.
     exact: Vec<bool>,
@@ -97,7 +107,8 @@ impl<'s, 'a> Planner<'s, 'a> {
             next: sources.description.instance.len() as u32,
             named: named.collect(),
             doubled: names.filter(|name| !known.insert(*name)).collect(),
-            instanced: vec![false; meshes.len()],
+            instanced: vec![[false; 2]; meshes.len()],
+            coloured: meshes.iter().map(|mesh| sources.colors_show(mesh)).collect(),
             exact: meshes.iter().map(is_sphere).collect(),
             stretched: meshes.iter().map(|m| is_sphere(m) && !is_even(&m.transform.0)).collect(),
         }
@@ -118,11 +129,12 @@ impl<'s, 'a> Planner<'s, 'a> {
         if self.doubled.contains(table.mesh.as_str()) {
             return Err(sources.at(place, "two meshes have this name: rename one"));
         }
-        self.instanced[mesh] = true;
         let affine = invertible(sources, table.transform, place)?;
         let material = table.material.as_ref().map(|m| sources.material(m, place)).transpose()?;
         let own = invertible(sources, meshes[mesh].transform, place)?;
-        let whole = Job { material, placement: number, own, ..Job::new(mesh, affine * own) };
+        let plain = material.is_some() && self.coloured[mesh];
+        self.instanced[mesh][usize::from(plain)] = true;
+        let whole = Job { material, placement: number, own, plain, ..Job::new(mesh, affine * own) };
         self.exact[mesh] = self.exact[mesh] && may_be_exact(sources, &whole)?;
         self.plan.copies.push(match self.stretched[mesh] {
             true => whole,
@@ -137,7 +149,7 @@ impl<'s, 'a> Planner<'s, 'a> {
         let affine = invertible(self.sources, table.transform, &format!("mesh \"{}\"", mesh_name(table)))?;
         let job = Job::new(mesh, affine);
         let (exact, stretched) = (self.exact[mesh], self.stretched[mesh]);
-        if !self.instanced[mesh] {
+        if self.instanced[mesh] == [false; 2] {
             let exact = exact && may_be_exact(self.sources, &job)?;
             match exact && stretched || table.moving {
                 true => {
@@ -149,7 +161,8 @@ impl<'s, 'a> Planner<'s, 'a> {
             }
         } else {
             let affine = if stretched { DAffine3::IDENTITY } else { affine };
-            self.plan.stored.push(Job { affine, exact, ..job });
+            let kinds = [false, true].into_iter().zip(self.instanced[mesh]).filter(|(_, placed)| *placed);
+            self.plan.stored.extend(kinds.map(|(plain, _)| Job { affine, exact, plain, ..job }));
         }
         Ok(())
     }

@@ -162,6 +162,14 @@ impl<'a> Sources<'a> {
         Some(self.beside(table.file.as_ref()?))
     }
 
+    /// Whether a mesh shows colours of its OBJ file's vertices.
+    pub fn colors_show(&self, table: &MeshTable) -> bool {
+        let file = self.file_of(table).filter(|path| table.material.is_none() && Format::of(path) == Format::Obj);
+        let parts = file.and_then(|path| self.files.get(&path)).map_or(&[][..], |file| &file.parts);
+        let is_shown = |name: &str| table.group.as_ref().is_none_or(|group| group == name);
+        parts.iter().any(|part| is_shown(&part.name) && !part.mesh.colors.is_empty())
+    }
+
     /// Index of a `[[material]]`.
     ///
     /// # Errors

@@ -25,8 +25,8 @@ const PARTS: usize = 64;
 
 /// A mesh in the triangle array: where, and how it is called.
 pub struct Stored {
-    /// Index of the `[[mesh]]`; `None`: all that is in world space.
-    pub mesh: Option<usize>,
+    /// What is stored of which `[[mesh]]`; `None`: all that is in world space.
+    pub job: Option<Job>,
     /// Indices of the mesh's triangles.
     pub range: Range<usize>,
     /// Names of the mesh's objects.
@@ -58,7 +58,7 @@ pub fn store(sources: &mut Sources, plan: &Plan, scene: &Scene, geometry: &mut G
     // At once: each of many small meshes would move all before it.
     memory::reserve(sources.path.display(), &mut geometry.triangles, triangles as usize)?;
     let read = Read::new(sources);
-    let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new(), soft: None }];
+    let mut stored = vec![Stored { job: None, range: 0..0, objects: Vec::new(), soft: None }];
     for (i, job) in jobs.into_iter().enumerate() {
         let start = geometry.triangles.len();
         let baked = i < plan.baked.len();
@@ -70,7 +70,7 @@ pub fn store(sources: &mut Sources, plan: &Plan, scene: &Scene, geometry: &mut G
             stored[0].objects.extend(objects);
             stored[0].range.end = end;
         } else {
-            stored.push(Stored { mesh: Some(job.mesh), range: start..end, objects, soft });
+            stored.push(Stored { job: Some(*job), range: start..end, objects, soft });
         }
     }
     sources.files.clear();
@@ -80,31 +80,24 @@ pub fn store(sources: &mut Sources, plan: &Plan, scene: &Scene, geometry: &mut G
     Ok(stored)
 }
 
-/// What the materials of a scene read of all meshes, and which of these show materials of their own. Found once, for many meshes.
-struct Read<'a> {
+/// What the materials of a scene read of all meshes. Found once, for many meshes.
+struct Read {
     /// Whether some material reads coordinates of textures.
     uvs: bool,
     /// Whether some texture reads second ones.
     second: bool,
     /// Whether some material needs tangents.
     tangents: bool,
-    /// By the names of meshes that instances place: whether each of these gives a material.
-    worn: HashMap<&'a str, bool>,
 }
 
-impl<'a> Read<'a> {
-    fn new(sources: &Sources<'a>) -> Self {
+impl Read {
+    fn new(sources: &Sources) -> Self {
         let materials = &sources.library.materials;
         let stretched = materials.list.iter().any(|m| m.anisotropy != 0.0);
-        let mut worn = HashMap::new();
-        for instance in &sources.description.instance {
-            *worn.entry(instance.mesh.as_str()).or_insert(true) &= instance.material.is_some();
-        }
         Self {
             uvs: stretched || !materials.textures.is_empty(),
             second: materials.textures.any_second(),
             tangents: stretched || materials.list.iter().any(has_normal_map),
-            worn,
         }
     }
 }
@@ -124,7 +117,7 @@ fn lamps_of(sources: &Sources, plan: &Plan, job: &Job, lamps: Lamps) -> Result<u
         }
         _ => 0,
     };
-    let copies = || plan.copies.iter().filter(|copy| copy.mesh == job.mesh).count().max(1) as u64;
+    let copies = || plan.copies.iter().filter(|copy| copy.stored_as() == job.stored_as()).count().max(1) as u64;
     Ok(if triangles > 0 { copies() * triangles } else { 0 })
 }
 
@@ -195,7 +188,7 @@ struct Addition<'a, 'l> {
     first: u32,
     /// Whether some texture reads second coordinates, and whether some material needs tangents.
     second: bool,
-    /// Whether colours of vertices count: those of an OBJ file where neither its table nor all of its instances give it another material.
+    /// Whether colours of vertices count: those of an OBJ file where neither its table nor an instance gives it another material.
     colors: bool,
     tangents: bool,
     /// What splits lamps, and how often they may be quartered.
@@ -213,8 +206,7 @@ impl<'a, 'l> Addition<'a, 'l> {
         let place = format!("mesh \"{}\"", mesh_name(table));
         let material = override_of(sources, job)?;
         let is_obj = table.file.as_deref().is_some_and(|file| Format::of(file) == Format::Obj);
-        let all_worn = table.name.as_deref().is_some_and(|name| read.worn.get(name) == Some(&true));
-        let colors = !(is_obj && (material.is_some() || all_worn));
+        let colors = !(job.plain || is_obj && material.is_some());
         Ok(Self { job: *job, table, place, material, placement, first, second, colors, tangents, lamps })
     }
 
