@@ -1,6 +1,7 @@
 //! Tests that scenes are the same whether what instances place is baked into world space, as where nothing moves, or stored once.
 use std::path::Path;
 use tallow::layout::{ATTRIBUTE_COLORS, Triangle};
+use tallow::scene::description::Transform;
 use tallow::scene::{Loaded, Pose, Scene, SceneFile, Vertices};
 
 /// The scene as `tallow sequence` has it, and as `tallow render` does.
@@ -71,4 +72,48 @@ fn a_moving_mesh_that_some_instances_show_in_its_colours_is_deformed_in_all() {
     let change = scene.apply(&Pose { meshes: vec![(leaf, bent)], ..Pose::default() }).unwrap();
     assert!(scene.triangles.iter().all(|t| t.v2 == [0.0, 3.0, 0.0]), "{:?}", scene.triangles);
     assert!(change.deformed.iter().map(|d| d.mesh).eq([leaf; 2]) && scene.bounds[1][1] == 3.0, "{change:?}");
+}
+
+/// Whether two boxes are the same but for rounding.
+fn close(a: [[f32; 3]; 2], b: [[f32; 3]; 2]) -> bool {
+    a.as_flattened().iter().zip(b.as_flattened()).all(|(a, b)| (a - b).abs() < 1e-5 * (1.0 + a.abs()))
+}
+
+#[test]
+fn bounds_are_those_of_what_is_placed_and_so_are_default_heights_of_bumps() {
+    let folder = tempfile::tempdir().unwrap();
+    image::GrayImage::new(2, 2).save(folder.path().join("bump.png")).unwrap();
+    std::fs::write(folder.path().join("stone.mtl"), "newmtl stone\nmap_bump bump.png\n").unwrap();
+    let stone =
+        "mtllib stone.mtl\nv 0 0 1\nv 1 0 -1\nv -1 0 -1\nv 0 2 0\nvt 0 0\nusemtl stone\nf 1/1 2/1 4/1\nf 2/1 3/1 4/1\n";
+    std::fs::write(folder.path().join("stone.obj"), stone).unwrap();
+    let placed = |angle: i32| {
+        format!(
+            "[[mesh]]\nname = 'stone'\nfile = 'stone.obj'\n[[mesh]]\nname = 'ball'\nshape = 'sphere'\n\
+             [[mesh]]\nshape = 'sphere'\nsegments = 40\nname = 'round'\n\
+             [[instance]]\nname = 'first'\nmesh = 'stone'\ntransform = {{ rotate = [30, {angle}, 45], translate = [3, 0, 0] }}\n\
+             [[instance]]\nmesh = 'stone'\ntransform = {{ rotate = [0, 70, -20], scale = [1, 2, 1], translate = [-3, 0, 1] }}\n\
+             [[instance]]\nmesh = 'ball'\ntransform = {{ rotate = [45, 45, 45], translate = [0, 0, 2] }}\n\
+             [[instance]]\nmesh = 'round'\ntransform = {{ rotate = [45, 45, 0], scale = 2, translate = [0, 1, -2] }}\n"
+        )
+    };
+    let [mut stored, baked] = both(folder.path(), &placed(60));
+    assert!(stored.instances.len() == 4 && baked.instances.is_empty());
+    assert!(close(stored.bounds, baked.bounds), "{:?} is not {:?}", stored.bounds, baked.bounds);
+    let heights = [&stored, &baked].map(|scene| scene.materials.iter().map(|m| m.bump_scale).fold(0.0, f32::max));
+    assert!(heights[0] > 0.0 && (heights[0] / heights[1] - 1.0).abs() < 1e-5, "{heights:?}");
+    // In another pose, too.
+    let [turned, fixed] = both(folder.path(), &placed(200));
+    assert!(!close(stored.bounds, turned.bounds), "control");
+    let there = glam::DAffine3::from_mat4(
+        glam::Mat4::from_cols_array_2d(&{
+            let i = turned.instances[turned.instance_numbers().iter().position(|n| *n == 0).unwrap()];
+            [i.world0, i.world1, i.world2, [0.0, 0.0, 0.0, 1.0]]
+        })
+        .transpose()
+        .as_dmat4(),
+    );
+    let first = stored.rig.placement("first").unwrap();
+    stored.apply(&Pose { instances: vec![(first, Transform::from(there))], ..Pose::default() }).unwrap();
+    assert!(close(stored.bounds, fixed.bounds), "{:?} is not {:?}", stored.bounds, fixed.bounds);
 }

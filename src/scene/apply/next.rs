@@ -6,7 +6,7 @@ use crate::layout::{
 };
 use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
-use crate::scene::build::hierarchy::{check_none_lost, instance, is_speck, reach};
+use crate::scene::build::hierarchy::{check_none_lost, instance, is_speck, placed, reach};
 use crate::scene::build::plan::is_even;
 use crate::scene::build::soft::{Placed, Soft};
 use crate::scene::description::{LightTable, Transform};
@@ -153,8 +153,13 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
     }
     let mut bounds: Vec<_> = scene.rig.trees.iter().map(|tree| tree.bounds).collect();
     meshes.iter().for_each(|mesh| bounds[mesh.tree] = mesh.bounds);
-    let reach =
-        |hidden: &HashSet<u32>| reach(&bounds, tree_of, hidden, &copies).map_err(|what| format!("instances {what}"));
+    let farthest = |tree: usize, direction| match meshes.iter().find(|mesh| mesh.tree == tree) {
+        Some(mesh) => bvh::along(&mesh.placed.triangles, direction),
+        None => bvh::farthest(&scene.nodes, scene.rig.trees[tree].nodes.start as u32, &scene.triangles, direction),
+    };
+    let reach = |hidden: &HashSet<u32>| {
+        reach(&placed(&copies, tree_of, hidden, &bounds), farthest).map_err(|what| format!("instances {what}"))
+    };
     let (mut hidden, mut world) = (flat.clone(), reach(&flat)?);
     let bounds_of = |copy: usize| bounds[tree_of[copy] as usize];
     let specks: Vec<_> = (0..copies.len()).filter(|&copy| is_speck(&copies[copy], bounds_of(copy), world)).collect();

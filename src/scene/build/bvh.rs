@@ -16,10 +16,12 @@ use wide::Wide;
 mod clusters;
 mod level;
 mod ploc;
+mod reach;
 mod refit;
 mod shallow;
 mod wide;
 
+pub use reach::{along, farthest};
 pub use refit::refit;
 
 /// Relative growth of every box. Quantisation in the builder and slabs in the kernel round at 2^-24: this keeps their

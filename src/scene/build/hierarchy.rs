@@ -8,7 +8,7 @@ use super::store::Stored;
 use crate::error::{Checked, Result};
 use crate::layout::{Instance, NONE, TRAVERSAL_STACK};
 use crate::memory;
-use crate::scene::rig::Tree;
+use crate::scene::rig::{Rig, Tree};
 use crate::scene::{MAX_COORDINATE, Scene};
 use glam::{DAffine3, Vec3};
 use std::collections::{HashMap, HashSet};
@@ -35,7 +35,7 @@ pub fn build(
         let most = plan.copies.iter().map(|copy| copy.placement + 1).max().unwrap_or(0);
         scene.rig.placed = vec![NONE; most.max(sources.description.instance.len() as u32) as usize];
         lower_levels(&copies, stored, geometry, scene);
-        top_level(sources, scene)?;
+        top_level(sources, geometry, scene)?;
     }
     size_stack(scene);
     Ok(())
@@ -144,10 +144,14 @@ pub fn instance(affine: &DAffine3, root: u32) -> Instance {
     }
 }
 
-fn top_level(sources: &Sources, scene: &mut Scene) -> Result<()> {
+fn top_level(sources: &Sources, geometry: &Geometry, scene: &mut Scene) -> Result<()> {
     let copies = std::mem::take(&mut scene.instances);
-    let bounds: Vec<_> = scene.rig.trees.iter().map(|tree| tree.bounds).collect();
-    let reached = reach(&bounds, &scene.rig.tree_of, &scene.rig.hidden, &copies);
+    let Rig { trees, tree_of, hidden, .. } = &scene.rig;
+    let bounds: Vec<_> = trees.iter().map(|tree| tree.bounds).collect();
+    let farthest = |tree: usize, direction| {
+        bvh::farthest(&scene.nodes, trees[tree].nodes.start as u32, &geometry.triangles, direction)
+    };
+    let reached = reach(&placed(&copies, tree_of, hidden, &bounds), farthest);
     scene.bounds = reached.map_err(|what| sources.at("instances", what))?;
     check_none_lost(scene, &copies, &scene.rig.hidden, scene.bounds)
         .map_err(|[place, what]| sources.at(place, what))?;
@@ -155,23 +159,58 @@ fn top_level(sources: &Sources, scene: &mut Scene) -> Result<()> {
     Ok(())
 }
 
-/// World-space bounds of the copies that are not `hidden`; `tree_of` says which tree each places, and `bounds` how far that reaches.
+/// A copy that is seen.
+pub struct PlacedTree<'a> {
+    copy: &'a Instance,
+    /// Index of the tree that it places.
+    tree: usize,
+    /// World-space bounds of the tree's box, which may be larger than those of what is in it.
+    around: Bounds,
+}
+
+/// The copies that are not `hidden`; `tree_of` says which tree each places, and `bounds` how far that reaches in its own space.
+pub fn placed<'a>(
+    copies: &'a [Instance],
+    tree_of: &[u32],
+    hidden: &HashSet<u32>,
+    bounds: &[Bounds],
+) -> Vec<PlacedTree<'a>> {
+    let seen = (0..).zip(copies).filter(|(number, _)| !hidden.contains(number));
+    let place = |(number, copy): (u32, &'a Instance)| {
+        let tree = tree_of[number as usize] as usize;
+        PlacedTree { copy, tree, around: bvh::world_bounds(copy, bounds[tree]) }
+    };
+    seen.map(place).collect()
+}
+
+/// World-space bounds of all triangles that are seen, as if they were stored there; `farthest` tells how far those of a tree reach along
+/// a direction, as [`bvh::along`] does.
 ///
 /// # Errors
 /// A sentence, where that is too far.
-pub fn reach(bounds: &[Bounds], tree_of: &[u32], hidden: &HashSet<u32>, copies: &[Instance]) -> Checked<Bounds> {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for (number, copy) in (0..).zip(copies).filter(|(number, _)| !hidden.contains(number)) {
-        let [l, h] = bvh::world_bounds(copy, bounds[tree_of[number as usize] as usize]).map(Vec3::from);
-        (low, high) = (low.min(l), high.max(h));
+pub fn reach(seen: &[PlacedTree], farthest: impl Fn(usize, Vec3) -> f32) -> Checked<Bounds> {
+    if seen.is_empty() {
+        return Ok(Bounds::default());
     }
-    if hidden.len() == copies.len() {
-        (low, high) = (Vec3::ZERO, Vec3::ZERO);
-    }
-    match is_too_far(low.abs().max(high.abs()).max_element()) {
+    let low = [0, 1, 2].map(|axis| -farthest_along(seen, axis, -1.0, &farthest));
+    let high = [0, 1, 2].map(|axis| farthest_along(seen, axis, 1.0, &farthest));
+    match low.into_iter().chain(high).any(|coordinate| is_too_far(coordinate.abs())) {
         true => Err(format!("reach beyond the limit of {MAX_COORDINATE:e}")),
-        false => Ok([low.to_array(), high.to_array()]),
+        false => Ok([low, high]),
     }
+}
+
+/// How far anything reaches along an axis of the world, or for a `sign` of -1 against it. Only copies whose boxes reach farther than what
+/// was found are looked into, beginning with that whose box reaches farthest.
+fn farthest_along(seen: &[PlacedTree], axis: usize, sign: f32, farthest: impl Fn(usize, Vec3) -> f32) -> f32 {
+    let at_most = |one: &PlacedTree| one.around.map(|corner| sign * corner[axis]).into_iter().fold(f32::MIN, f32::max);
+    let exactly = |one: &PlacedTree| {
+        let [x, y, z, shift] = [one.copy.world0, one.copy.world1, one.copy.world2][axis].map(|v| sign * v);
+        farthest(one.tree, Vec3::new(x, y, z)) + shift
+    };
+    let first = seen.iter().max_by(|a, b| at_most(a).total_cmp(&at_most(b)));
+    let found = first.map_or(f32::NEG_INFINITY, exactly);
+    seen.iter().fold(found, |found, one| if at_most(one) > found { found.max(exactly(one)) } else { found })
 }
 
 /// Checks that the world, in the space of each copy that is not `hidden`, is not too large: rays are transformed to the

@@ -44,7 +44,7 @@ pub fn refit(nodes: &mut [BvhNode], tree: Range<usize>, boxes: impl Fn(u32) -> A
 }
 
 /// Primitives of a child that is a leaf; none for one that is empty.
-fn leaves(node: &BvhNode, slot: usize) -> Range<u32> {
+pub fn leaves(node: &BvhNode, slot: usize) -> Range<u32> {
     let meta = bytemuck::cast::<_, [u8; 8]>(node.meta)[slot];
     let first = node.primitive_base + u32::from(meta & 31);
     first..first + u32::from(meta >> 5).count_ones()

@@ -295,3 +295,26 @@ fn the_shallowest_tree_is_as_deep_as_its_number_needs() {
         assert_eq!(compare(&geometry, &nodes, root, 0..geometry.triangles.len(), &mut random), 0, "{count}");
     }
 }
+
+#[test]
+fn a_hierarchy_reaches_as_far_as_its_triangles() {
+    let mut random = Random::new(5);
+    for count in [1, 7, 300, 5000] {
+        let mut triangles: Vec<_> = (0..count)
+            .map(|i| {
+                let at = random.point() * 9.0;
+                let corner = |random: &mut Random| (at + random.point()).as_vec3().to_array();
+                let [v0, v1, v2] = [(); 3].map(|()| corner(&mut random));
+                let sphere = if i % 5 == 4 { crate::layout::SPHERE } else { 0 };
+                Triangle { v0, v1, v2, primitive: sphere, ..Triangle::default() }
+            })
+            .collect();
+        let mut nodes = Vec::new();
+        let (root, order) = build(&triangles, 0, &mut nodes, LEVELS);
+        reorder(&mut triangles, &order);
+        for _ in 0..200 {
+            let direction = (random.point() * 10.0).as_vec3();
+            assert_eq!(farthest(&nodes, root, &triangles, direction), along(&triangles, direction));
+        }
+    }
+}
