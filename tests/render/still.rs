@@ -5,7 +5,8 @@ use std::fs;
 use tallow::gpu::Gpu;
 use tallow::layout::{PixelStats, SPHERE};
 use tallow::render::{Outputs, Renderer};
-use tallow::scene::{Loaded, SceneFile};
+use tallow::scene::description::Transform;
+use tallow::scene::{Loaded, Pose, SceneFile};
 
 const WORLD: &str = "[camera]\nposition = [0.0, 1.5, 6.0]\ntarget = [0.0, 0.5, 0.0]\nfov = 45.0\n[environment]\n\
     [[light]]\ntype = 'directional'\ndirection = [0.4, -1.0, -0.3]\nirradiance = [3.0, 2.0, 1.0]\n\
@@ -82,4 +83,46 @@ fn what_moves_or_is_much_is_not_baked() {
     ] {
         assert_eq!(still(&more), instances, "{case}");
     }
+}
+
+/// Meshes whose coordinates are so small that products of three of them are no numbers of 32 bits, in metres of their instances.
+#[test]
+fn a_mesh_that_is_tiny_in_its_own_space_looks_as_one_that_is_not() {
+    let gpu = gpu();
+    let placed = |own: &str, scale: [&str; 3]| {
+        let [block, ball, exact] = scale;
+        let mesh = |name: &str, shape: &str| {
+            format!("[[mesh]]\nname = '{name}'\n{shape}\nmaterial = 'red'\ntransform = {{ scale = {own} }}\n")
+        };
+        let at = |name: &str, x: f64, scale: &str| {
+            format!(
+                "[[instance]]\nname = '{name}'\nmesh = '{name}'\n\
+                 transform = {{ translate = [{x}, 0.7, 0.5], rotate = [0, 30, 0], scale = {scale} }}\n"
+            )
+        };
+        [
+            mesh("a", "shape = 'cube'"),
+            mesh("b", "shape = 'sphere'\nsegments = 24"),
+            mesh("c", "shape = 'sphere'"),
+            at("a", -1.5, block),
+            at("b", 0.0, ball),
+            at("c", 1.5, exact),
+        ]
+        .concat()
+    };
+    let [mut tiny, usual] = [("1e-15", ["5e14", "6e14", "7e14"]), ("1.0", ["0.5", "0.6", "0.7"])]
+        .map(|(own, scale)| load(&placed(own, scale), false));
+    assert!(tiny.warnings.is_empty() && tiny.instances.len() == usual.instances.len(), "{:?}", tiny.warnings);
+    let [(found, ids), (expected, its)] = [&tiny, &usual].map(|scene| picture(&gpu, scene));
+    alike(&found, &expected, 1).unwrap();
+    assert!(its.iter().filter(|object| **object > 0).count() > 300, "control: they are seen");
+    let elsewhere = ids.iter().zip(&its).filter(|(a, b)| a != b).count();
+    assert!(elsewhere * 200 <= ids.len(), "{elsewhere} pixels show another object");
+    // Their instances are placed as the file has them.
+    let lifted = [5e14, 0., 0., -1.5, 0., 5e14, 0., 2.0, 0., 0., 5e14, 0.5, 0., 0., 0., 1.];
+    let number = tiny.rig.placement("a").unwrap();
+    tiny.apply(&Pose { instances: vec![(number, Transform::try_from(lifted).unwrap())], ..Pose::default() }).unwrap();
+    let high = tiny.bounds[1][1];
+    assert!((high - 2.5).abs() < 1e-4, "{high}");
+    assert_silent(&gpu);
 }

@@ -117,3 +117,14 @@ fn bounds_are_those_of_what_is_placed_and_so_are_default_heights_of_bumps() {
     stored.apply(&Pose { instances: vec![(first, Transform::from(there))], ..Pose::default() }).unwrap();
     assert!(close(stored.bounds, fixed.bounds), "{:?} is not {:?}", stored.bounds, fixed.bounds);
 }
+
+#[test]
+fn a_scene_too_small_for_rays_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let warned = |scale: &str| {
+        let text = format!("[[mesh]]\nshape = 'cube'\ntransform = {{ scale = {scale} }}\n");
+        both(folder.path(), &text)
+            .map(|scene| scene.warnings.iter().any(|w| w.contains("choose a smaller unit of length")))
+    };
+    assert_eq!((warned("1e-12"), warned("1e-6")), ([true; 2], [false; 2]));
+}

@@ -3,6 +3,7 @@
 use super::bake;
 use super::brightness;
 use super::coat;
+use super::enlarge::enlarge;
 use super::environment;
 use super::geometry::Geometry;
 use super::hierarchy;
@@ -83,6 +84,7 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     if scene.triangles.is_empty() {
         warnings.push("the scene shows no surface".into());
     }
+    warnings.extend(warn_of_smallness(scene));
     if scene.lights.is_empty() {
         warnings.push("the scene has no light: its image will be black".into());
     }
@@ -93,6 +95,18 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     scene.rig.content = scene.content.clone();
     scene.rig.rest = posed(scene, Fingerprint::default());
     Ok(())
+}
+
+/// A warning about scenes that are so small that rays miss surfaces: they are traced by products of three lengths, which have to be
+/// numbers of 32 bits.
+fn warn_of_smallness(scene: &Scene) -> Option<String> {
+    const SMALL: f32 = 1e-9;
+    let far = scene.bounds.as_flattened().iter().fold(0.0, |far: f32, v| far.max(v.abs()));
+    (!scene.triangles.is_empty() && far < SMALL).then(|| {
+        format!(
+            "all surfaces lie within {far:e} of the origin: rays miss what is so small; choose a smaller unit of length"
+        )
+    })
 }
 
 /// A warning about smooth panes that stop shadow rays: that it is dark behind them looks like a mistake.
@@ -124,7 +138,8 @@ fn add_attributes(path: &Path, words: Vec<u32>, scene: &mut Scene) -> Result<()>
 /// Everything but textures; returns the words of vertices' attributes.
 fn geometry(sources: &mut Sources, still: bool, scene: &mut Scene) -> Result<Vec<u32>> {
     environment::add_lights(sources, scene)?;
-    let plan = plan::plan(sources)?;
+    let mut plan = plan::plan(sources)?;
+    enlarge(sources, &mut plan);
     let plan = if still { bake::bake(sources, plan) } else { plan };
     let mut geometry = Geometry::default();
     let stored = store::store(sources, &plan, scene, &mut geometry)?;

@@ -7,6 +7,7 @@ pub mod brightness;
 pub mod bvh;
 pub mod coat;
 pub mod encode;
+pub mod enlarge;
 pub mod environment;
 pub mod fresnel;
 pub mod geometry;

@@ -14,6 +14,7 @@ use crate::scene::load::mesh_file::Format;
 use crate::scene::load::obj::ObjFile;
 use crate::scene::load::obj_part::Part;
 use crate::scene::{BYTES_OF_TRIANGLE, MAX_COORDINATE, Scene};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -126,6 +127,19 @@ pub fn triangles_of(sources: &Sources, job: &Job) -> u64 {
     let table = &sources.description.mesh[job.mesh];
     let file = sources.file_of(table).and_then(|path| sources.files.get(&path));
     if job.exact { 1 } else { triangles(table, file) }
+}
+
+/// The largest coordinate of a mesh as `job` stores it.
+pub fn reach_of(sources: &Sources, job: &Job) -> f64 {
+    let table = &sources.description.mesh[job.mesh];
+    let file = sources.file_of(table).and_then(|path| sources.files.get(&path));
+    let meshes = file.iter().flat_map(|file| parts_of(table, file)).map(|(part, _)| &*part.mesh);
+    let points = table.data.iter().chain(meshes).flat_map(|mesh| &mesh.positions);
+    // Shapes lie between -1 and 1.
+    let corners = (0..8).map(|i| [0, 1, 2].map(|axis| if i >> axis & 1 == 0 { -1.0 } else { 1.0 }));
+    let corners = corners.filter(|_| table.shape.is_some());
+    let far = |p: [f32; 3]| job.affine.transform_point3(Vec3::from(p).as_dvec3()).abs().max_element();
+    points.copied().chain(corners).map(far).fold(0.0, f64::max)
 }
 
 /// Words that the attributes of a mesh's vertices may take.
