@@ -16,7 +16,7 @@ pub struct World {
     boxes: Option<Buffer<Aabb>>,
 }
 
-/// The triangles of a mesh, or a run of spheres among them: no structure can have both.
+/// The triangles of a mesh, or the spheres among them: no structure can have both.
 struct Part {
     /// Number of the mesh among [`Scene::meshes`].
     mesh: usize,
@@ -82,17 +82,15 @@ fn shapes<'a>(triangles: &'a Buffer<Triangle>, boxes: Option<&'a Buffer<Aabb>>) 
 fn parts(scene: &Scene, effects: &Effects) -> Vec<Part> {
     let once = effects.clear_walls; // they dim light each time that a ray comes to them
     let of_mesh = |(mesh, range): (usize, Range<usize>)| {
-        let mut first = range.start;
-        let runs = scene.triangles[range.clone()].chunk_by(|a, b| is_sphere(a) == is_sphere(b)).map(move |run| {
-            first += run.len();
-            (is_sphere(&run[0]), first - run.len()..first)
-        });
-        let runs: Vec<_> = runs.filter(|(spheres, _)| *spheres && effects.spheres).map(|(_, run)| run).collect();
-        let all_spheres = runs.first() == Some(&range);
+        let in_boxes = |i: &usize| effects.spheres && is_sphere(&scene.triangles[*i]);
+        // One structure of all spheres, from the first to the last: a ray pays for each structure whose box it meets, and triangles
+        // between spheres have no boxes.
+        let ends = [range.clone().find(in_boxes), range.clone().rfind(in_boxes)];
+        let spheres = ends[0].zip(ends[1]).map(|(first, last)| Mesh { range: first..last + 1, of_boxes: true, once });
         // What spheres are told by is no triangle that is seen, and lies among those of the mesh.
-        let triangles = (!all_spheres).then_some(Mesh { range, of_boxes: false, once });
-        let shapes = triangles.into_iter().chain(runs.into_iter().map(|range| Mesh { range, of_boxes: true, once }));
-        shapes.map(|shapes| Part { mesh, shapes }).collect::<Vec<_>>()
+        let has_triangles = !range.clone().all(|i| in_boxes(&i));
+        let triangles = has_triangles.then_some(Mesh { range, of_boxes: false, once });
+        triangles.into_iter().chain(spheres).map(|shapes| Part { mesh, shapes }).collect::<Vec<_>>()
     };
     scene.meshes().into_iter().enumerate().flat_map(of_mesh).collect()
 }
@@ -129,4 +127,37 @@ fn placements(scene: &Scene, parts: &[Part], instances: usize) -> Result<Vec<Pla
         parts.map(move |&mesh| Placement { rows: rows(number), mesh, number: number as u32 }).collect::<Vec<_>>()
     };
     Ok(meshes.into_iter().enumerate().flat_map(place).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::{Outputs, called_for};
+    use std::path::Path;
+
+    /// The structures of a scene of so many cubes and spheres in turn: whether each is of boxes, and its triangles.
+    fn structures(text: &str) -> (Scene, Vec<(bool, Range<usize>)>) {
+        let loaded = Scene::parse(Path::new("scene.toml"), text).unwrap();
+        let effects = called_for(&loaded, &loaded.settings, Outputs::default());
+        let parts = parts(&loaded, &effects).into_iter().map(|part| (part.shapes.of_boxes, part.shapes.range));
+        (loaded.scene.clone(), parts.collect())
+    }
+
+    #[test]
+    fn spheres_among_triangles_have_one_structure() {
+        let one = |shape: &str, x: usize| {
+            format!("[[mesh]]\nshape = '{shape}'\ntransform = {{ translate = [{x}, 0, 0], scale = 0.3 }}\n")
+        };
+        let row = |shape: &str| (0..20).map(|x| one(shape, x)).collect::<String>();
+        let (scene, both) = structures(&(0..20).map(|x| one("cube", x) + &one("sphere", x)).collect::<String>());
+        let runs = scene.triangles.chunk_by(|a, b| is_sphere(a) == is_sphere(b)).count();
+        assert!(runs > 4, "control: the hierarchy has them in turn, in {runs} runs");
+        let [(false, triangles), (true, spheres)] = &both[..] else { panic!("{both:?}") };
+        assert_eq!(triangles, &(0..260));
+        let within = |i: usize| spheres.contains(&i);
+        assert!(scene.triangles.iter().enumerate().all(|(i, t)| !is_sphere(t) || within(i)), "{spheres:?}");
+        assert!([spheres.start, spheres.end - 1].into_iter().all(|i| is_sphere(&scene.triangles[i])), "{spheres:?}");
+        assert_eq!(structures(&row("sphere")).1, [(true, 0..20)]);
+        assert_eq!(structures(&row("cube")).1, [(false, 0..240)]);
+    }
 }

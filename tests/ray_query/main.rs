@@ -56,12 +56,26 @@ fn masked(mut scene: Loaded) -> Loaded {
     scene
 }
 
-/// One of each kind: a single level, a sphere among its triangles, instances with a sphere among them, masks on such, and panes.
-fn scenes() -> [(&'static str, Loaded); 6] {
+/// Blocks and balls in turn, which lie mixed in leaf order.
+fn balls_among_blocks() -> Loaded {
+    let one = |i: u32| {
+        let at = format!("translate = [{}, {}, 0], scale = 0.3", i % 6, i / 6);
+        let mesh = |shape: &str, z: u32| {
+            format!("[[mesh]]\nshape = '{shape}'\ntransform = {{ {at}, rotate = [0, {z}, 0] }}\n")
+        };
+        mesh(["cube", "sphere"][i as usize % 2], i)
+    };
+    let text: String = ["[environment]\n".to_owned()].into_iter().chain((0..36).map(one)).collect();
+    Scene::parse(Path::new("scene.toml"), &text).unwrap().with(|s| (s.width, s.height, s.spp) = (48, 32, 16))
+}
+
+/// One of each kind: a single level, spheres among its triangles, instances with a sphere among them, masks on such, and panes.
+fn scenes() -> [(&'static str, Loaded); 7] {
     let moving = || poses::at(&poses::MOMENTS[2]).with(|s| s.spp = 16);
     [
         ("Cornell box", shipped("cornell-box/scene.toml")),
         ("box with a ball", shipped("cornell-box/glass.toml")),
+        ("balls among blocks", balls_among_blocks()),
         ("instances", moving()),
         ("masked box", masked(shipped("cornell-box/scene.toml"))),
         ("masked instances", masked(moving())),
