@@ -58,6 +58,8 @@ pub struct Renderer {
     paths: u32,
     pub(super) soft_lights: bool,
     pub(super) fingerprint: Option<Fingerprint>,
+    /// [`Scene::serial`] of what the device has; none after an update that has failed half way.
+    pub(super) serial: Option<u64>,
     /// Whether what was accumulated is of another seed, first sample or scene than the renderer is set to: until the next start.
     pub(super) relabelled: AtomicBool,
 }
@@ -150,6 +152,7 @@ impl Renderer {
         let (constants, priority_push) = (frame_constants(scene, settings)?, priority_push(scene, settings));
         let (soft_lights, stack) = (scene.has_soft_lights(), scene.stack);
         let fingerprint = Some(scene.fingerprint([settings.width, settings.height])?);
+        let serial = Some(scene.serial());
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         let (settings, first_sample) = (settings.clone(), settings.first_sample);
         let history = None;
@@ -164,6 +167,7 @@ impl Renderer {
             stack,
             soft_lights,
             fingerprint,
+            serial,
             relabelled: AtomicBool::new(false),
         };
         if !renderer.settings.allocate.is_even() {
@@ -211,9 +215,10 @@ impl Renderer {
     /// Records one step.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for a step that this renderer has no room for, [`crate::error::Error::Device`]. Other steps of
-    /// another renderer are not told apart and make a wrong picture.
+    /// [`crate::error::Error::Usage`] for a step that this renderer has no room for and after [`Renderer::update`] has failed on the device,
+    /// [`crate::error::Error::Device`]. Other steps of another renderer are not told apart and make a wrong picture.
     pub fn record(&self, rec: &mut Recorder, step: &Step) -> Result<()> {
+        self.serial.ok_or_else(half_updated)?;
         if !self.cut().has_room_for(step) {
             return Err(Error::Usage(format!("{step:?} is of another renderer: take those of Renderer::steps")));
         }
@@ -254,19 +259,21 @@ impl Renderer {
         Ok((self.settings.allocate.policy.reference)(&inputs))
     }
 
-    /// How the last allocation went.
+    /// How the last [`Step::Allocate`] went; all zeros before the first.
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`].
+    /// [`crate::error::Error::Usage`] for a renderer that cannot place samples, [`crate::error::Error::Device`].
     pub fn apportionment(&self) -> Result<Apportionment> {
+        self.frame.allocation()?;
         Ok(self.frame.film.counts.state.read()?[0])
     }
 
-    /// Paths of the list that the last [`Step::Allocate`] or [`Step::Choose`] made.
+    /// Paths of the list that the last [`Step::Allocate`] or [`Step::Choose`] made; 0 before the first.
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`].
+    /// [`crate::error::Error::Usage`] for a renderer that cannot place samples, [`crate::error::Error::Device`].
     pub fn listed(&self) -> Result<u64> {
+        self.frame.allocation()?;
         let pixels = self.settings.pixels();
         let [low, high] = self.frame.film.counts.offset.read_range(pixels..pixels + 1)?[0];
         Ok(u64::from(low) | u64::from(high) << 32)
@@ -376,6 +383,11 @@ pub(super) fn lacks_effect(effect: Effect) -> Error {
          finds in the scene as it will be",
         effect.name()
     ))
+}
+
+/// For a renderer that knows neither the scene before a change nor that after it.
+pub(super) fn half_updated() -> Error {
+    Error::Usage("the last update of this renderer failed half way: update with Change::everything first".into())
 }
 
 /// The effects that a scene, its settings and the outputs call for.

@@ -2,7 +2,7 @@
 use super::buffers::DeviceScene;
 use super::frame;
 use super::push::{frame_constants, priority_push};
-use super::renderer::{Renderer, called_for, lacks_effect};
+use super::renderer::{Renderer, called_for, half_updated, lacks_effect};
 use super::upload::{parts, whole};
 use crate::error::{Error, Result};
 use crate::gpu::Recorder;
@@ -19,6 +19,9 @@ impl Renderer {
     /// arrays that were edited by hand are brought by [`Change::everything`], which has them checked; but spheres that are traced by ray
     /// queries need a new renderer.
     ///
+    /// Every change has to be brought, in order, or several as one by [`Change::add`]; what an earlier one leaves out is told by
+    /// [`Scene::serial`]. [`Change::everything`] makes up for all.
+    ///
     /// A camera that [`Renderer::set_camera`] has set stays, until a pose names one, or with [`Change::everything`].
     ///
     /// What is recorded has to be submitted, in this order: later updates bring only what changed since. After a recording that was thrown
@@ -29,13 +32,15 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Usage`] with the first effect that the scene calls for now and that was not compiled: make the renderer with it, by
-    /// [`Renderer::specialised`]. [`Error::Usage`] also for a camera that cannot be, for a scene of its own whose hierarchy is deeper,
-    /// such as one that was loaded in another pose, and for one with another number of triangles, materials or textures or an
-    /// environment of another size; [`Error::Scene`] where everything has changed, to what [`Scene::check`] refuses; [`Error::Device`].
-    /// But for the last, nothing has changed in the renderer then; the scene keeps its pose. To go back, apply the pose before anew, and
-    /// update with both changes as one. After [`Error::Device`], such as where memory has run out, record no step before an update with
-    /// [`Change::everything`] has succeeded: host and device do not agree until then.
+    /// [`Renderer::specialised`]. [`Error::Usage`] also where the scene has changed otherwise than by `change`, for a camera that cannot
+    /// be, for a scene of its own whose hierarchy is deeper, such as one that was loaded in another pose, and for one with another number
+    /// of triangles, materials or textures or an environment of another size; [`Error::Scene`] where everything has changed, to what
+    /// [`Scene::check`] refuses; [`Error::Device`] and [`Error::OutOfDeviceMemory`].
+    /// But for the last two, nothing has changed in the renderer then; the scene keeps its pose. To go back, apply the pose before anew, and
+    /// update with both changes as one. After [`Error::Device`] and [`Error::OutOfDeviceMemory`], host and device do not agree:
+    /// [`Renderer::record`] refuses all steps until an update with [`Change::everything`] has succeeded.
     pub fn update(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
+        self.check_told(scene, change)?;
         self.check_parts(scene)?;
         if change.everything {
             scene.check()?;
@@ -43,6 +48,7 @@ impl Renderer {
         self.check_effects(scene, change)?;
         let mut constants = frame_constants(scene, &self.settings)?;
         *self.relabelled.get_mut() = true;
+        self.serial = None; // until all of it is recorded
         // Without a fingerprint the camera is not the scene's but one that was set.
         let follows_scene = self.fingerprint.is_some();
         if !(change.camera || change.framing && follows_scene) {
@@ -59,7 +65,24 @@ impl Renderer {
         if change.camera || self.fingerprint.is_some() {
             self.fingerprint = Some(scene.fingerprint(size)?);
         }
+        self.serial = Some(scene.serial());
         Ok(())
+    }
+
+    /// Whether the renderer knows all that has changed in the scene once it knows of `change`.
+    fn check_told(&self, scene: &Scene, change: &Change) -> Result<()> {
+        let now = scene.serial();
+        let knows = |serial: u64| serial == now || change.serials == Some([serial, now]);
+        match self.serial {
+            _ if change.everything => Ok(()),
+            Some(serial) if knows(serial) => Ok(()),
+            Some(_) => Err(Error::Usage(
+                "the scene has changed otherwise than this change says: bring all changes to every renderer, in their order (Change::add \
+                 makes several one), or update once with Change::everything"
+                    .into(),
+            )),
+            None => Err(half_updated()),
+        }
     }
 
     /// Before the scene changes: what frames that begin with samples of the last need of it as it was.

@@ -5,11 +5,14 @@ use crate::layout::{LIGHT_ENVIRONMENT, Light};
 use std::ops::Range;
 
 /// What [`Scene::apply`](super::Scene::apply) has changed, for those who copy it to a device. Every renderer of the scene takes every
-/// change, in order: what it was not told of stays as it was.
+/// change, in order: [`Renderer::update`](crate::render::Renderer::update) refuses one that follows another which it was not told of.
 #[derive(Clone, Debug, Default)]
 pub struct Change {
     /// All that a pose can change, whatever the device has of it: see [`Change::everything`].
     pub everything: bool,
+    /// [`Scene::serial`](super::Scene::serial) before and after it; none where nothing has changed, or an engine fills in the rest itself for
+    /// arrays that it has edited.
+    pub serials: Option<[u64; 2]>,
     /// The camera, which a pose has named.
     pub camera: bool,
     /// Where a camera stands or looks that is to have all of the scene in view. It does not move one that
@@ -70,6 +73,7 @@ impl Change {
     pub fn is_of_camera_alone(&self) -> bool {
         let Self {
             everything,
+            serials: _,
             camera: _,
             framing: _,
             nodes,
@@ -96,10 +100,12 @@ impl Change {
     /// Adds what a later pose has changed in the same scene.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a change of fewer things than this one's, which is left as it is.
+    /// [`Error::Usage`] for a change of another scene or one that does not follow this one, which is left as it is.
     pub fn add(&mut self, later: Self) -> Result<()> {
+        let serials = joined(self.serials, later.serials)?;
         let instance_now = number(&self.instance_now, later.instance_now)?;
         (self.instance_now, self.triangle_now) = (instance_now, number(&self.triangle_now, later.triangle_now)?);
+        self.serials = serials;
         self.everything |= later.everything;
         self.camera |= later.camera;
         self.framing |= later.framing;
@@ -117,13 +123,27 @@ impl Change {
     }
 }
 
+fn not_the_next() -> Error {
+    Error::Usage(
+        "a change of another scene was added, or one was left out: add all changes of one scene, in their order".into(),
+    )
+}
+
+/// From the serial number before a change to that after a later one.
+fn joined(now: Option<[u64; 2]>, later: Option<[u64; 2]>) -> Result<Option<[u64; 2]>> {
+    match (now, later) {
+        (Some([_, after]), Some([before, _])) if after != before => Err(not_the_next()),
+        (Some([first, _]), Some([_, last])) => Ok(Some([first, last])),
+        _ => Ok(now.or(later)),
+    }
+}
+
 /// A change of numbers, followed by a later one.
 fn number(now: &[u32], later: Vec<u32>) -> Result<Vec<u32>> {
-    let other = || Error::Usage("a change of another scene was added: add changes of one scene, in their order".into());
     match (now.is_empty(), later.is_empty()) {
         (true, _) => Ok(later),
         (false, true) => Ok(now.to_vec()),
-        (false, false) => now.iter().map(|&i| later.get(i as usize).copied().ok_or_else(other)).collect(),
+        (false, false) => now.iter().map(|&i| later.get(i as usize).copied().ok_or_else(not_the_next)).collect(),
     }
 }
 

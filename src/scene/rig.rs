@@ -11,6 +11,7 @@ use crate::layout::{Instance, Light, Material, NONE, Triangle};
 use glam::DAffine3;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// What can move in a scene, by the names and numbers that its description gives. A scene that was not loaded or built has
 /// nothing of it.
@@ -28,6 +29,8 @@ pub struct Rig {
     pub(in crate::scene) hidden: HashSet<u32>,
     /// Copies whose transform has no inverse. They have no other one until a pose places them again.
     pub(in crate::scene) flat: HashSet<u32>,
+    /// Which of the states of all scenes of this process the scene is in: 0 as it was loaded, another number after each change.
+    pub(in crate::scene) serial: u64,
     /// Copies by the numbers that a pose calls them; [`NONE`] for one that is fixed.
     pub(in crate::scene) placed: Vec<u32>,
     /// Levels of the top and of the deepest tree, which kernels are compiled for.
@@ -124,6 +127,12 @@ impl Scene {
         self.instances.iter().enumerate().map(mesh_of).collect()
     }
 
+    /// The number of the state that the scene is in: 0 as it was loaded, another one after each [`Scene::apply`] that has changed
+    /// something. No two scenes of a process come to have the same number but by a clone. Arrays that are edited by hand keep it.
+    pub fn serial(&self) -> u64 {
+        self.rig.serial
+    }
+
     /// How many instances are seen. Those that are hidden come last.
     pub fn seen_instances(&self) -> usize {
         self.instances.len() - self.rig.hidden.len().min(self.instances.len())
@@ -131,6 +140,12 @@ impl Scene {
 }
 
 impl Rig {
+    /// Gives the scene a number that no scene has had; returns the one before.
+    pub(in crate::scene) fn renew_serial(&mut self) -> u64 {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        std::mem::replace(&mut self.serial, NEXT.fetch_add(1, Relaxed))
+    }
+
     /// Whether the scene was loaded or built from a description: trees have levels even where there are none of them.
     pub(in crate::scene) fn is_built(&self) -> bool {
         self.levels != [0; 2]

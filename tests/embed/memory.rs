@@ -5,6 +5,7 @@ use crate::support::engine::Engine;
 use ash::vk::Handle;
 use std::path::Path;
 use std::sync::atomic::Ordering::SeqCst;
+use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu, Recorder};
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::description::{Description, EnvironmentTable, Mesh, MeshTable};
@@ -113,5 +114,35 @@ fn a_frame_does_not_keep_the_memory_of_a_large_upload() {
     let few = Change { instances: true, materials: true, ..Change::default() };
     let after = [(); 3].map(|()| takes(&few));
     assert!(after[..2] == [taken; 2] && after[2] < 1 << 20, "{after:?} bytes of {taken}");
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// A scene of which the device has a part would be neither that before nor that after the change.
+#[test]
+fn after_memory_has_run_out_in_an_update_no_step_is_recorded() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let scene = grid(400);
+    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let mut picture = |renderer: &Renderer| {
+        renderer.steps().try_for_each(|step| renderer.run(&mut frame, &step).map(drop))?;
+        renderer.picture()
+    };
+    let before = picture(&renderer).unwrap();
+    let everything = Change::everything(&scene);
+    let update = |renderer: &mut Renderer, change: &Change| {
+        gpu.run(&mut FrameResources::new(&gpu)?, |rec| renderer.update(rec, &scene, change)).map(drop)
+    };
+    hooks::MOST_BYTES.store(100, SeqCst);
+    let failed = update(&mut renderer, &everything);
+    hooks::MOST_BYTES.store(u64::MAX, SeqCst);
+    assert!(matches!(failed, Err(Error::OutOfDeviceMemory(_))), "{failed:?}");
+    for told in [picture(&renderer).map(drop), update(&mut renderer, &Change::default())] {
+        assert!(told.is_err_and(|e| matches!(&e, Error::Usage(what) if what.contains("Change::everything"))));
+    }
+    update(&mut renderer, &everything).unwrap();
+    assert!(picture(&renderer).unwrap().pixels == before.pixels);
     assert_eq!(engine.messages(), Vec::<String>::new());
 }

@@ -306,6 +306,21 @@ fn films_tell_what_their_samples_are_of_or_nothing() {
     assert_silent(&gpu);
 }
 
+/// Where nothing is placed there is no list, and before the first there are no paths on it.
+#[test]
+fn a_renderer_tells_of_lists_only_where_it_makes_some() {
+    let gpu = gpu();
+    let scene = scene(|s| s.spp = 1);
+    let even = Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap();
+    let able = Renderer::resumable(&gpu, &scene, &scene.settings, split()).unwrap();
+    Job::new(&even).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
+    for told in [even.listed().map(drop), even.apportionment().map(drop)] {
+        assert!(told.is_err_and(|e| e.to_string().contains("\"adaptive\"")));
+    }
+    assert_eq!((able.listed().unwrap(), able.apportionment().unwrap()), (0, Default::default()));
+    assert_silent(&gpu);
+}
+
 /// What policies find once per camera is no priority yet: a file that is written before the first round would show it.
 #[test]
 fn a_start_leaves_priorities_as_they_are() {

@@ -188,6 +188,50 @@ fn lamps_and_sky_that_come_to_shine_stay_out_of_sharp_direct_light() {
     assert_silent(&gpu);
 }
 
+/// A renderer that was not told of a change would show a scene of two poses.
+#[test]
+fn a_change_that_a_renderer_was_not_told_of_is_found() {
+    let gpu = gpu();
+    let mut scene = at(&Moment::default());
+    let mut renderer = renderer(&gpu, &scene);
+    let [first, second] = [0, 1].map(|number| {
+        let pose = pose(&scene, &MOMENTS[number], 0.0);
+        scene.apply(&pose).unwrap()
+    });
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let mut update = |renderer: &mut Renderer, scene: &Scene, change: &Change| {
+        gpu.run(&mut frame, |rec| renderer.update(rec, scene, change)).map(drop)
+    };
+    for (change, what) in [(&second, "of which the first is not known"), (&first, "behind which there is another")] {
+        let told = update(&mut renderer, &scene, change).expect_err(what);
+        let text = told.to_string();
+        assert!(
+            matches!(told, Error::Usage(_)) && text.contains("Change::add") && text.contains("Change::everything"),
+            "{text}"
+        );
+    }
+    assert!(render(&gpu, &renderer) == fresh(&gpu, &at(&Moment::default())), "nothing has changed");
+    let mut both = first.clone();
+    both.add(second.clone()).unwrap();
+    update(&mut renderer, &scene, &both).unwrap();
+    assert!(render(&gpu, &renderer) == fresh(&gpu, &scene));
+    update(&mut renderer, &scene, &second).expect("what is known is told again");
+    let told = second.clone().add(first.clone()).unwrap_err().to_string();
+    assert!(told.contains("in their order"), "{told}");
+    // A pose that changes nothing need not be told.
+    let still = scene.apply(&Pose::default()).unwrap();
+    assert_eq!(still.serials, None);
+    let pose = pose(&scene, &MOMENTS[2], 0.0);
+    let mut other = scene.clone();
+    let (here, there) = (scene.apply(&pose).unwrap(), other.apply(&pose).unwrap());
+    assert!(update(&mut renderer, &scene, &there).is_err(), "of a clone that went its own way");
+    update(&mut renderer, &scene, &here).unwrap();
+    assert!(update(&mut renderer, &other, &there).is_err());
+    update(&mut renderer, &other, &Change::everything(&other)).unwrap();
+    assert!(render(&gpu, &renderer) == fresh(&gpu, &scene));
+    assert_silent(&gpu);
+}
+
 #[test]
 fn a_recording_that_was_thrown_away_is_made_up_for() {
     let gpu = gpu();

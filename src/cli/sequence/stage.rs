@@ -126,6 +126,10 @@ impl<'a> Stage<'a> {
             report.error = Some(e.to_string());
             (self.chain, self.held) = (Chain::default(), None);
         }
+        if let Err(Error::Memory(_)) = result {
+            // A pose may be half taken, of which no change tells: the next frame makes another renderer.
+            (self.renderer, self.change) = (None, Change::default());
+        }
         report.seconds = begun.elapsed().as_secs_f64();
         (report, result)
     }

@@ -17,6 +17,8 @@ use std::ops::Range;
 /// [`Error::Memory`](crate::error::Error::Memory), before which a change of lights may be half done.
 pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
     let mut change = Change::default();
+    // Also where this fails half way, so that no renderer takes the scene for one that it knows.
+    let serial = scene.rig.renew_serial();
     if let Some(materials) = next.materials {
         wear(scene, materials, &mut change);
     }
@@ -46,6 +48,10 @@ pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
     }
     // A camera without a position or a target looks at where the scene reaches now.
     change.framing = scene.view.frames_scene() && scene.bounds != before;
+    match change.is_of_camera_alone() && !change.camera && !change.framing {
+        true => scene.rig.serial = serial,
+        false => change.serials = Some([serial, scene.rig.serial]),
+    }
     identify(scene);
     Ok(change)
 }
