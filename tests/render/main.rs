@@ -6,6 +6,9 @@ mod analytic;
 mod ghosts;
 #[path = "../support/glazed.rs"]
 mod glazed;
+#[allow(dead_code)]
+#[path = "../support/gltf.rs"]
+mod gltf_file;
 mod lens;
 #[path = "../support/moving.rs"]
 mod moving;

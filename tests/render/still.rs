@@ -1,7 +1,10 @@
 //! Tests scenes in which nothing moves: what instances place is baked, where it is little, and looks as it did.
 use crate::alike::alike;
+use crate::gltf_file::{data, floats};
 use crate::support::{assert_silent, gpu, render};
+use serde_json::json;
 use std::fs;
+use std::path::Path;
 use tallow::gpu::Gpu;
 use tallow::layout::{PixelStats, SPHERE};
 use tallow::render::{Outputs, Renderer};
@@ -124,5 +127,107 @@ fn a_mesh_that_is_tiny_in_its_own_space_looks_as_one_that_is_not() {
     tiny.apply(&Pose { instances: vec![(number, Transform::try_from(lifted).unwrap())], ..Pose::default() }).unwrap();
     let high = tiny.bounds[1][1];
     assert!((high - 2.5).abs() < 1e-4, "{high}");
+    assert_silent(&gpu);
+}
+
+/// A glTF file of two triangles that are bent, with normals and coordinates of textures; `tangents` gives them such, which lead elsewhere.
+fn sheet(tangents: bool) -> String {
+    let positions = [-1., -1., 0., 1., -1., 0.2, 1., 1., 0., -1., 1., 0.2];
+    let normals = [0.1, 0., 1., 0., 0.2, 1., -0.1, 0., 1., 0., 0., 1.];
+    let uvs = [0., 2., 2., 2., 2., 0., 0., 0.];
+    let given = [0.6, 0.8, 0., -1., 0.6, 0.8, 0., -1., 0.6, 0.8, 0., -1., 0.6, 0.8, 0., -1.];
+    let indices = [0u32, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()).collect::<Vec<_>>();
+    let bytes = [floats(&positions), floats(&normals), floats(&uvs), floats(&given), indices].concat();
+    let view = |first: usize, length: usize| json!({ "buffer": 0, "byteOffset": first, "byteLength": length });
+    let accessor =
+        |view: usize, kind: &str| json!({ "bufferView": view, "componentType": 5126, "count": 4, "type": kind });
+    let mut attributes = json!({ "POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2 });
+    if tangents {
+        attributes["TANGENT"] = json!(3);
+    }
+    json!({
+        "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": attributes, "indices": 4 }] }],
+        "accessors": [accessor(0, "VEC3"), accessor(1, "VEC3"), accessor(2, "VEC2"), accessor(3, "VEC4"),
+            { "bufferView": 4, "componentType": 5125, "count": 6, "type": "SCALAR" }],
+        "bufferViews": [view(0, 48), view(48, 48), view(96, 32), view(128, 64), view(192, 24)],
+        "buffers": [{ "byteLength": bytes.len(), "uri": data(&bytes) }]
+    })
+    .to_string()
+}
+
+/// Two sheets, a ball, a disk and a cube: each is turned, mirrored, stretched and laid down by an instance.
+fn placed_in(material: &str, keys: &str) -> String {
+    let meshes = [
+        "file = 'sheet.gltf'",
+        "file = 'turned.gltf'",
+        "shape = 'sphere'\nsegments = 20",
+        "shape = 'disk'",
+        "shape = 'cube'",
+    ];
+    let places = [
+        (-2, "rotate = [20, 30, 10], scale = 0.5"),
+        (-1, "rotate = [0, 160, 0], scale = [-0.5, 0.5, 0.5]"),
+        (1, "rotate = [10, 50, 80], scale = [0.3, 0.6, 0.5]"),
+        (2, "rotate = [-90, 0, 0], scale = 0.6"),
+    ];
+    let mut text = format!("{WORLD}[[material]]\nname = '{material}'\n{keys}\n");
+    for (number, shape) in (0u8..).zip(meshes) {
+        let (y, z) = (f32::from(number) * 0.7, f32::from(number) * -0.4);
+        text += &format!("[[mesh]]\nname = 'm{number}'\n{shape}\nmaterial = '{material}'\n");
+        for (x, turned) in places {
+            text +=
+                &format!("[[instance]]\nmesh = 'm{number}'\ntransform = {{ {turned}, translate = [{x}, {y}, {z}] }}\n");
+        }
+    }
+    text
+}
+
+/// The pictures that [`every_material_looks_the_same_on_what_is_baked`] shows, and the sheets.
+fn write_files(folder: &Path) {
+    fs::write(folder.join("sheet.gltf"), sheet(false)).unwrap();
+    fs::write(folder.join("turned.gltf"), sheet(true)).unwrap();
+    let save = |name: &str, texel: &dyn Fn(u8, u8) -> [u8; 4]| {
+        let picture = image::RgbaImage::from_fn(8, 8, |x, y| image::Rgba(texel(x as u8, y as u8)));
+        picture.save(folder.join(name)).unwrap();
+    };
+    save("normals.png", &|x, y| [90 + 10 * x, 170 - 12 * y, 230, 255]);
+    save("colour.png", &|x, y| [30 * x, 30 * y, 120, if (x + y) % 3 == 0 { 40 } else { 255 }]);
+    save("height.png", &|x, y| [20 * x + 9 * y; 4].map(|v| v | 3));
+}
+
+const MATERIALS: [(&str, &str); 6] = [
+    ("mapped", "normal_map = 'normals.png'"),
+    ("bumped", "color = [0.7, 0.6, 0.5]\nbump = 'height.png'\nbump_scale = 0.3"),
+    ("masked", "color_texture = 'colour.png'\nopacity_texture = 'colour.png'"),
+    ("brushed", "type = 'conductor'\nalpha = 0.4\nalpha_v = 0.05"),
+    ("shining", "emission = [2, 1, 1]\nemission_texture = 'colour.png'"),
+    (
+        "coated",
+        "type = 'metallic-roughness'\nmetallic = 0.5\nroughness = 0.4\nnormal_map = 'normals.png'\nclearcoat = 1\n\
+         clearcoat_normal_map = 'normals.png'",
+    ),
+];
+
+/// What maps, masks, lamps and directions of roughness show does not depend on how a mesh is stored, wherever instances put it.
+#[test]
+fn every_material_looks_the_same_on_what_is_baked() {
+    let gpu = gpu();
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path());
+    for (material, keys) in MATERIALS {
+        let path = folder.path().join("scene.toml");
+        fs::write(&path, placed_in(material, keys)).unwrap();
+        let [placed, baked] = [false, true].map(|still| {
+            let mut file = SceneFile::open(&path).unwrap();
+            if still {
+                file.stays_still();
+            }
+            file.load().unwrap().with(|s| (s.width, s.height, s.spp, s.max_depth) = (96, 72, 32, 3))
+        });
+        assert!(placed.instances.len() == 21 && baked.instances.is_empty(), "{material}: {}", placed.instances.len());
+        let [(before, _), (after, _)] = [&placed, &baked].map(|scene| picture(&gpu, scene));
+        alike(&before, &after, MATERIALS.len()).unwrap_or_else(|why| panic!("{material}: {why}"));
+    }
     assert_silent(&gpu);
 }

@@ -128,3 +128,35 @@ fn a_scene_too_small_for_rays_is_told() {
     };
     assert_eq!((warned("1e-12"), warned("1e-6")), ([true; 2], [false; 2]));
 }
+
+/// One instance among others is no larger than what rounding leaves of its place: it is not seen.
+#[test]
+fn an_instance_too_small_to_be_seen_refuses_no_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("leaf.obj"), COLOURED).unwrap();
+    std::fs::write(folder.path().join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n").unwrap();
+    for scale in ["1e-8", "1e-13"] {
+        let text = format!(
+            "[[mesh]]\nname = 'leaf'\nfile = 'leaf.obj'\n[[instance]]\nname = 'far'\nmesh = 'leaf'\n\
+             transform = {{ scale = {scale}, translate = [5, 0, 0] }}\n[[instance]]\nmesh = 'leaf'\n"
+        );
+        let [mut stored, baked] = both(folder.path(), &text);
+        assert_eq!(baked.triangles.len(), 1, "{scale}");
+        assert_eq!(stored.seen_instances(), if scale == "1e-13" { 1 } else { 2 }, "{scale}");
+        // It can grow.
+        let far = stored.rig.placement("far").unwrap();
+        let moved = Transform::from(glam::DAffine3::from_translation(glam::DVec3::X * 7.0));
+        stored.apply(&Pose { instances: vec![(far, moved)], ..Pose::default() }).unwrap();
+        assert_eq!((stored.seen_instances(), stored.bounds[1][0]), (2, 8.0), "{scale}");
+    }
+    // A file without any surface is at fault wherever it is placed.
+    let text = "[[mesh]]\nname = 'flat'\nfile = 'flat.obj'\n[[instance]]\nmesh = 'flat'\n";
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    for still in [false, true] {
+        let mut file = SceneFile::open(&folder.path().join("scene.toml")).unwrap();
+        if still {
+            file.stays_still();
+        }
+        assert!(file.load().is_err_and(|e| e.to_string().contains("has no triangles")), "{still}");
+    }
+}

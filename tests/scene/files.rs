@@ -227,8 +227,8 @@ fn coordinates_reach_to_the_limit_and_no_further() {
         ("1", "[[instance]]\nmesh = \"m\"\ntransform = { scale = 1.1e12 }", "instances: reach"),
         ("1e12", "[[instance]]\nmesh = \"m\"\ntransform = { translate = [1e11, 0, 0] }", "instances: reach"),
         (
-            "1",
-            "[[instance]]\nmesh = \"m\"\n[[instance]]\nmesh = \"m\"\ntransform = { scale = 9e-13, translate = [1, 0, 0] }",
+            "1e4",
+            "[[instance]]\nmesh = \"m\"\n[[instance]]\nmesh = \"m\"\ntransform = { scale = 9e-9, translate = [1, 0, 0] }",
             "seen from it",
         ),
         ("1", "[[light]]\ntype = \"point\"\nintensity = 1\nposition = [0, 0, 1.1e12]", "light 1: position"),

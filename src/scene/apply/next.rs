@@ -6,7 +6,7 @@ use crate::layout::{
 };
 use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
-use crate::scene::build::hierarchy::{check_none_lost, instance, is_speck, placed, reach};
+use crate::scene::build::hierarchy::{check_none_lost, instance, seen};
 use crate::scene::build::plan::is_even;
 use crate::scene::build::soft::{Placed, Soft};
 use crate::scene::description::{LightTable, Transform};
@@ -157,16 +157,8 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
         Some(mesh) => bvh::along(&mesh.placed.triangles, direction),
         None => bvh::farthest(&scene.nodes, scene.rig.trees[tree].nodes.start as u32, &scene.triangles, direction),
     };
-    let reach = |hidden: &HashSet<u32>| {
-        reach(&placed(&copies, tree_of, hidden, &bounds), farthest).map_err(|what| format!("instances {what}"))
-    };
-    let (mut hidden, mut world) = (flat.clone(), reach(&flat)?);
-    let bounds_of = |copy: usize| bounds[tree_of[copy] as usize];
-    let specks: Vec<_> = (0..copies.len()).filter(|&copy| is_speck(&copies[copy], bounds_of(copy), world)).collect();
-    if !specks.is_empty() {
-        hidden.extend(specks.into_iter().map(|copy| copy as u32));
-        world = reach(&hidden)?;
-    }
+    let (hidden, world) =
+        seen(&copies, tree_of, &flat, &bounds, farthest).map_err(|what| format!("instances {what}"))?;
     check_none_lost(scene, &copies, &hidden, world).map_err(|[place, what]| format!("{place}: {what}"))?;
     Ok(NextCopies { all: copies, flat, hidden, world })
 }

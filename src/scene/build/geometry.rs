@@ -281,7 +281,7 @@ fn plain() -> Shading {
 }
 
 /// Unit normal by the right-hand rule, or `None` where rounding leaves no area (below 1e-12 of the longest edge squared).
-fn face_normal(p: [Vec3; 3]) -> Option<Vec3> {
+pub fn face_normal(p: [Vec3; 3]) -> Option<Vec3> {
     let [a, b, c] = p.map(|p| p.as_dvec3());
     let cross = (b - a).cross(c - a);
     let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());

@@ -146,21 +146,43 @@ pub fn instance(affine: &DAffine3, root: u32) -> Instance {
 
 fn top_level(sources: &Sources, geometry: &Geometry, scene: &mut Scene) -> Result<()> {
     let copies = std::mem::take(&mut scene.instances);
-    let Rig { trees, tree_of, hidden, .. } = &scene.rig;
+    let Rig { trees, tree_of, .. } = &scene.rig;
     let bounds: Vec<_> = trees.iter().map(|tree| tree.bounds).collect();
     let farthest = |tree: usize, direction| {
         bvh::farthest(&scene.nodes, trees[tree].nodes.start as u32, &geometry.triangles, direction)
     };
-    let reached = reach(&placed(&copies, tree_of, hidden, &bounds), farthest);
-    scene.bounds = reached.map_err(|what| sources.at("instances", what))?;
+    let found = seen(&copies, tree_of, &HashSet::new(), &bounds, farthest);
+    (scene.rig.hidden, scene.bounds) = found.map_err(|what| sources.at("instances", what))?;
     check_none_lost(scene, &copies, &scene.rig.hidden, scene.bounds)
         .map_err(|[place, what]| sources.at(place, what))?;
     place(scene, copies, bvh::LEVELS);
     Ok(())
 }
 
+/// The copies that are not seen, those that are `flat` and those that are too small, and what the others reach: see [`reach`].
+///
+/// # Errors
+/// As [`reach`].
+pub fn seen(
+    copies: &[Instance],
+    tree_of: &[u32],
+    flat: &HashSet<u32>,
+    bounds: &[Bounds],
+    farthest: impl Fn(usize, Vec3) -> f32,
+) -> Checked<(HashSet<u32>, Bounds)> {
+    let reach = |hidden: &HashSet<u32>| reach(&placed(copies, tree_of, hidden, bounds), &farthest);
+    let (mut hidden, mut world) = (flat.clone(), reach(flat)?);
+    let bounds_of = |copy: usize| bounds[tree_of[copy] as usize];
+    let specks: Vec<_> = (0..copies.len()).filter(|&copy| is_speck(&copies[copy], bounds_of(copy), world)).collect();
+    if !specks.is_empty() {
+        hidden.extend(specks.into_iter().map(|copy| copy as u32));
+        world = reach(&hidden)?;
+    }
+    Ok((hidden, world))
+}
+
 /// A copy that is seen.
-pub struct PlacedTree<'a> {
+struct PlacedTree<'a> {
     copy: &'a Instance,
     /// Index of the tree that it places.
     tree: usize,
@@ -169,7 +191,7 @@ pub struct PlacedTree<'a> {
 }
 
 /// The copies that are not `hidden`; `tree_of` says which tree each places, and `bounds` how far that reaches in its own space.
-pub fn placed<'a>(
+fn placed<'a>(
     copies: &'a [Instance],
     tree_of: &[u32],
     hidden: &HashSet<u32>,
@@ -188,7 +210,7 @@ pub fn placed<'a>(
 ///
 /// # Errors
 /// A sentence, where that is too far.
-pub fn reach(seen: &[PlacedTree], farthest: impl Fn(usize, Vec3) -> f32) -> Checked<Bounds> {
+fn reach(seen: &[PlacedTree], farthest: impl Fn(usize, Vec3) -> f32) -> Checked<Bounds> {
     if seen.is_empty() {
         return Ok(Bounds::default());
     }
@@ -241,7 +263,7 @@ fn is_lost(copy: &Instance, world: Bounds) -> bool {
 const SPECK: f32 = 1e-9;
 
 /// Whether a copy of something of these bounds is too small to be seen, and for rays to be transformed to its space.
-pub fn is_speck(copy: &Instance, bounds: Bounds, world: Bounds) -> bool {
+fn is_speck(copy: &Instance, bounds: Bounds, world: Bounds) -> bool {
     let [low, high] = bounds.map(Vec3::from);
     let edge = |row: [f32; 4]| Vec3::from_slice(&row).abs().dot(high - low);
     let largest = [copy.world0, copy.world1, copy.world2].map(edge).into_iter().fold(0.0, f32::max);

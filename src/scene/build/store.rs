@@ -1,6 +1,6 @@
 //! Puts the triangles of all meshes into one array: first those in world space, then one mesh after another.
 use super::attributes::{Extras, MOST_WORDS, corners};
-use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
+use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar, face_normal};
 use super::plan::{Job, Plan, override_of};
 use super::soft::Soft;
 use super::sources::{Sources, mesh_name};
@@ -251,7 +251,8 @@ impl<'a, 'l> Addition<'a, 'l> {
         let repaired = repairs.warning(&self.place);
         if geometry.triangles.len() == before {
             let why = repaired.as_deref().unwrap_or("no face is in it: is it an OBJ file?");
-            match sources.file_of(self.table) {
+            // It may be placed so small that no triangle is left of it, which is no fault of the file.
+            match sources.file_of(self.table).filter(|_| !self.has_surface(&file)) {
                 Some(path) => return Err(Error::input(path, format!("has no triangles: {why}"))),
                 None => sources.library.warnings.push(format!("{} has no triangles", self.place)),
             }
@@ -261,6 +262,14 @@ impl<'a, 'l> Addition<'a, 'l> {
             sources.files.insert(path, file);
         }
         Ok((objects, soft))
+    }
+
+    /// Whether any triangle of the file has an area before it is placed.
+    fn has_surface(&self, file: &ObjFile) -> bool {
+        let has_area =
+            |mesh: &Mesh, corners: &[u32; 3]| face_normal(corners.map(|i| mesh.positions[i as usize].into())).is_some();
+        parts_of(self.table, file)
+            .any(|(part, _)| part.mesh.indices.as_chunks().0.iter().any(|t| has_area(&part.mesh, t)))
     }
 
     /// The triangles of a mesh that may be deformed are counted, so that none may be dropped.
