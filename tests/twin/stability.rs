@@ -369,6 +369,34 @@ fn mean(pixels: &[vec4]) -> f64 {
     pixels.iter().map(|c| f64::from(c[0] + c[1] + c[2])).sum::<f64>() / pixels.len() as f64
 }
 
+/// One pixel of a lamp beside an edge in the light: what lies far from it is filtered as without it.
+#[test]
+fn a_bright_pixel_does_not_blur_the_others() {
+    let gpu = gpu();
+    let mut plain = constant(64, 40, 1.0);
+    let edge = |i: usize| if i % 64 < 32 { 1.0 } else { 2.0 };
+    plain.radiance.iter_mut().enumerate().for_each(|(i, c)| *c = [edge(i), edge(i), edge(i), 4.0]);
+    let mut lamp = plain.clone();
+    lamp.radiance[0] = [1e5, 1e5, 1e5, 4.0];
+    let settings = FilterSettings::default().with(|s| {
+        s.edge.sigma_rt = 0.1;
+        s.footprint.levels = 2;
+        s.footprint.radius = 8;
+    });
+    let far = |i: usize| i % 64 >= 20;
+    for row in ["atrous", "bilateral", "wavelet"].map(|name| find(name).unwrap()) {
+        for input in [&plain, &lamp] {
+            let settings = settings.scaled_to(input);
+            for output in [run(&gpu, row, input, &settings).unwrap().0, (row.reference)(input, &settings)] {
+                let off = output.iter().enumerate().filter(|(i, _)| far(*i)).map(|(i, c)| (c[0] - edge(i)).abs());
+                let worst = largest(off);
+                assert!(worst < 1e-3, "{}: {worst}", row.name);
+            }
+        }
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn energy_is_kept() {
     let gpu = gpu();

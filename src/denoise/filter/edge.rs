@@ -12,7 +12,7 @@ settings! {
     pub struct EdgeSettings {
         /// What is given of them.
         EdgeOverrides {
-            /// Scale of radiance: what is white [default: the image's largest]
+            /// Scale of radiance: what is white [default: what 99.7 % of the image's lit pixels do not exceed]
             intensity: f32 = 1.0, FINITE_ABOVE_0;
             /// Radiance that is usual: auto takes errors as relative down to a tenth of it [default: the square of the mean root of
             /// the image's luminance]

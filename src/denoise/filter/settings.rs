@@ -49,7 +49,7 @@ impl FilterSettings {
         self
     }
 
-    /// The same with `intensity` and `extent` of an image: see [`Scales::applied_to`].
+    /// The same with `intensity`, `usual` and `extent` of an image: see [`Scales::applied_to`].
     pub fn scaled_by(self, scales: &Scales) -> Self {
         Self { edge: scales.applied_to(self.edge), ..self }
     }
