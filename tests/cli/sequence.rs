@@ -115,6 +115,43 @@ fn frames_through_a_lens_are_rendered_among_others() {
     assert_eq!([0, 1, 2, 3, 4].map(carried), [false, true, false, false, true]);
 }
 
+/// How alike the noise of two frames is, from 0 to 1: over an endless floor, a camera that is moved sees the same.
+fn alike(folder: &TempDir, [a, b]: [&str; 2]) -> f64 {
+    let [a, b] = [a, b].map(|file| {
+        let film = image::read(&folder.path().join(file)).unwrap();
+        let Some(Samples::F32(red)) = film.channel("R") else { panic!("{file}: no red") };
+        let mean = red.iter().map(|&v| f64::from(v)).sum::<f64>() / red.len() as f64;
+        red.iter().map(|&v| f64::from(v) - mean).collect::<Vec<_>>()
+    });
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt()
+}
+
+/// Behind a lens nothing is carried. Noise of one seed would be a pattern on the screen, through which the scene slides.
+#[test]
+fn noise_does_not_go_with_a_camera_that_moves() {
+    let folder = stage();
+    let scene = "[film]\nwidth = 40\nheight = 25\n[render]\nspp = 2\n[camera]\nposition = [0, 50, 0]\ntarget = [0, 0, 0]\n\
+                 up = [0, 0, 1]\nfov = 10\nlens_radius = 0.1\n[[mesh]]\nshape = 'rectangle'\n\
+                 transform = { rotate = [-90, 0, 0], scale = 1e4 }\nmaterial = 'floor'\n[[material]]\nname = 'floor'\n\
+                 [[mesh]]\nname = 'far'\nshape = 'cube'\nmaterial = 'floor'\ntransform = { translate = [5e3, 1, 0] }\n\
+                 [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\ntransform = { rotate = [90, 0, 0], scale = 1e3, translate = [0, 1e3, 0] }\n\
+                 [[material]]\nname = 'lamp'\nemission = 5\n[[animation]]\n";
+    let write = |moves: &str| fs::write(folder.path().join("s.toml"), format!("{scene}{moves}")).unwrap();
+    write(
+        "camera = true\nkeys = [{ time = 0, position = [0, 50, 0], target = [0, 0, 0] }, \
+           { time = 2, position = [2, 50, 0], target = [2, 0, 0] }]\n",
+    );
+    well(&folder, "--frames 0..3 --fps 1 -o m.#.exr --quiet");
+    well(&folder, "--frames 0..3 --fps 1 --only 2 -o alone.#.exr --quiet");
+    assert!(bits(&folder, "m.2.exr") == bits(&folder, "alone.2.exr"), "a frame alone is that of the sequence");
+    let of_moving = alike(&folder, ["m.0.exr", "m.1.exr"]);
+    write("instance = 'far'\nkeys = [{ time = 0, translate = [5e3, 1, 0] }, { time = 2, translate = [5e3, 2, 0] }]\n");
+    well(&folder, "--frames 0..3 --fps 1 -o s.#.exr --quiet");
+    let of_still = alike(&folder, ["s.0.exr", "s.1.exr"]);
+    assert!(of_moving < 0.3 && of_still > 0.9, "{of_moving}, {of_still}");
+}
+
 #[test]
 fn a_frame_in_another_light_is_another() {
     let folder = stage();

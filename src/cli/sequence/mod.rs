@@ -55,8 +55,9 @@ pub struct Args {
     /// Frames per second, such as 24 or 30000/1001
     #[arg(long, default_value = "24", value_parser = frames_per_second)]
     pub fps: f64,
-    /// Give each frame random numbers of its own (the seed plus its number), for those who average over frames. With one seed for
-    /// all, noise stands still where nothing moves
+    /// Give each frame random numbers of its own (the seed plus its number), for those who average over frames. Frames that carry
+    /// samples have them, and where the camera moves, those that cannot, as behind a lens. With --reproject off one seed serves all,
+    /// and noise stands still where nothing moves
     #[arg(long)]
     pub seed_per_frame: bool,
     /// Turn the camera about what it looks at, by so many degrees over all of --frames, from the first one

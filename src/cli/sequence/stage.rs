@@ -42,6 +42,8 @@ pub struct Stage<'a> {
     change: Change,
     /// How samples are carried, if they are.
     reproject: Option<Reproject>,
+    /// Whether each frame has random numbers of its own.
+    own_seeds: bool,
     /// What moves.
     moves: Moves,
     /// The frames before the one that is next.
@@ -80,6 +82,7 @@ impl<'a> Stage<'a> {
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         let rest = survey.effects(&settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
+        let own_seeds = args.seed_per_frame || reproject.is_some() || slides(args, &survey);
         let moves = Moves::of(&animation);
         render::warn_of_unread(&args.render, &settings);
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
@@ -96,6 +99,7 @@ impl<'a> Stage<'a> {
             renderer,
             change,
             reproject,
+            own_seeds,
             moves,
             chain,
             held,
@@ -177,10 +181,10 @@ impl<'a> Stage<'a> {
         self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))
     }
 
-    /// Frames whose samples are carried need numbers of their own.
+    /// What a frame is rendered with: its seed is the sequence's plus the frame's number, or the same for all.
     fn settings_of(&self, number: u32) -> Settings {
         let mut settings = self.settings.clone();
-        if self.args.seed_per_frame || self.reproject.is_some() {
+        if self.own_seeds {
             settings.seed = settings.seed.wrapping_add(number);
         }
         settings
@@ -295,6 +299,12 @@ fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
 fn show(preview: Option<&mut Preview>, film: &Film, args: &render::Args) -> Result<()> {
     let Some(preview) = preview else { return Ok(()) };
     preview.add(film, &args.png.write_options()).map_err(|what| Error::Usage(format!("--preview: {what}")))
+}
+
+/// Whether noise of one seed would be a pattern on the screen, through which the scene slides, since the camera moves. With
+/// `--reproject off`, frames have the seed that they are asked for with, to compare each with a render of its own.
+fn slides(args: &Args, survey: &Survey) -> bool {
+    args.carry.reproject != Some(Reprojection::Off) && survey.moves_camera()
 }
 
 /// How samples are carried: as asked for, or where something moves and nothing speaks against it.

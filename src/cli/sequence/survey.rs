@@ -9,6 +9,8 @@ use std::ops::Range;
 
 /// Frames that are looked at for effects: of more, some that are spread evenly.
 const FOR_EFFECTS: u32 = 256;
+/// Frames whose cameras are compared.
+const FOR_CAMERAS: u32 = 256;
 /// Frames whose bounds are taken: each moves all surfaces.
 const FOR_BOUNDS: u32 = 64;
 
@@ -46,6 +48,13 @@ impl Survey<'_> {
             }
         }
         effects
+    }
+
+    /// Whether frames are seen from different places, or otherwise by another camera.
+    pub fn moves_camera(&self) -> bool {
+        let mut cameras = self.poses(FOR_CAMERAS, |pose| pose.camera.is_some()).map(|pose| pose.camera);
+        let first = cameras.next();
+        cameras.any(|camera| Some(camera) != first)
     }
 
     /// What surfaces reach in all frames, where some move and the camera has no place of its own.

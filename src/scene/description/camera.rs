@@ -21,7 +21,7 @@ pub enum FovAxis {
 
 /// The `[camera]` table. Positions and lengths in world units. Without `position` and `world_from_camera` the camera
 /// looks at `target` (default: the middle of the scene) from where the whole scene is in view.
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Camera {
     /// Point that rays start from.
