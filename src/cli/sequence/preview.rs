@@ -3,7 +3,9 @@ use crate::cli::files::{Files, Item};
 use crate::error::{Error, Result};
 use crate::image::{self, Film, WriteOptions, output};
 use ::image::codecs::gif::{GifEncoder, Repeat};
+use ::image::imageops::dither;
 use ::image::{Delay, DynamicImage, Frame, RgbImage, RgbaImage};
+use color_quant::NeuQuant;
 use std::path::{Path, PathBuf};
 
 /// Pixels of the longer edge at most.
@@ -19,6 +21,12 @@ pub fn check(path: &Path) -> Result<()> {
     }
     Err(Error::Usage(format!("--preview {}: a preview goes to a .gif", path.display())))
 }
+
+/// Of RGBA.
+const CHANNELS: usize = 4;
+
+/// Pixels that the colours are chosen by, at most: of more, every so many-th.
+const PALETTE_PIXELS: usize = 1 << 20;
 
 /// Small pictures so far.
 #[derive(Default)]
@@ -56,7 +64,8 @@ impl Preview {
     }
 
     fn encode(&self, bytes: &mut Vec<u8>, fps: f64) -> std::result::Result<(), ::image::ImageError> {
-        let mut encoder = GifEncoder::new_with_speed(bytes, 10);
+        let palette = self.palette();
+        let mut encoder = GifEncoder::new(bytes);
         encoder.set_repeat(Repeat::Infinite)?;
         // A file counts in hundredths of a second, so that some frames are shown for longer than others.
         let hundredths = |frame: usize| (100.0 * frame as f64 / fps).round();
@@ -71,16 +80,38 @@ impl Preview {
         shown.iter().zip(ends).try_for_each(|(&frame, end)| {
             let time = (hundredths(end) - hundredths(frame)).clamp(2.0, 60_000.0);
             let delay = Delay::from_numer_denom_ms(10 * time as u32, 1);
-            encoder.encode_frame(Frame::from_parts(self.0[frame].clone(), 0, 0, delay))
+            encoder.encode_frame(Frame::from_parts(dithered(&self.0[frame], &palette), 0, 0, delay))
         })
     }
+
+    /// The 256 colours of all frames: with others for each, what stands still would change its colour.
+    fn palette(&self) -> NeuQuant {
+        let pixels = self.0.iter().map(|frame| frame.len() / CHANNELS).sum::<usize>();
+        let step = pixels.div_ceil(PALETTE_PIXELS).max(1);
+        let all = self.0.iter().flat_map(|frame| frame.chunks_exact(CHANNELS));
+        let some: Vec<u8> = all.step_by(step).flatten().copied().collect();
+        NeuQuant::new(1, 256, &some)
+    }
+}
+
+/// The picture in these colours, whose errors go to the pixels beside and below (Floyd and Steinberg 1976), so that there are no bands.
+fn dithered(picture: &RgbaImage, palette: &NeuQuant) -> RgbaImage {
+    let mut picture = picture.clone();
+    // `dither` needs a pixel beside the first.
+    match picture.width() {
+        1 => picture.chunks_exact_mut(CHANNELS).for_each(|pixel| palette.map_pixel(pixel)),
+        _ => dither(&mut picture, palette),
+    }
+    // The palette has alphas of its own where it is dark, which would be holes.
+    picture.chunks_exact_mut(CHANNELS).for_each(|pixel| pixel[3] = u8::MAX);
+    picture
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ::image::AnimationDecoder;
     use ::image::codecs::gif::GifDecoder;
+    use ::image::{AnimationDecoder, GenericImageView, Rgba};
 
     /// Milliseconds for which each of so many frames is shown.
     fn delays(frames: u32, fps: f64) -> Vec<u32> {
@@ -88,6 +119,32 @@ mod tests {
         Preview((0..frames).map(|_| RgbaImage::new(1, 1)).collect()).encode(&mut bytes, fps).unwrap();
         let read = GifDecoder::new(std::io::Cursor::new(bytes)).unwrap().into_frames().collect_frames().unwrap();
         read.iter().map(|frame| frame.delay().numer_denom_ms().0).collect()
+    }
+
+    /// 16,384 colours in two directions, which stand still, and below them others, which do not.
+    #[test]
+    fn a_preview_keeps_its_colours_from_frame_to_frame() {
+        let frame = |blue: u8| {
+            RgbaImage::from_fn(128, 192, |x, y| match y {
+                ..128 => Rgba([2 * x as u8, 2 * y as u8, 128, 255]),
+                _ => Rgba([2 * x as u8, 255 - blue, blue, 255]),
+            })
+        };
+        let preview = Preview(vec![frame(20), frame(230)]);
+        let mut bytes = Vec::new();
+        preview.encode(&mut bytes, 24.0).unwrap();
+        let read = GifDecoder::new(std::io::Cursor::new(bytes)).unwrap().into_frames().collect_frames().unwrap();
+        let above = |i: usize| read[i].buffer().view(0, 0, 128, 128).to_image();
+        assert!(above(0) == above(1), "what stands still");
+        let block = |picture: &RgbaImage, x: u32, y: u32, c: usize| {
+            picture.view(16 * x, 16 * y, 16, 16).pixels().map(|(.., pixel)| f32::from(pixel[c])).sum::<f32>() / 256.0
+        };
+        // The palette's colours are means, so that the outermost are beyond them. Without dithering some of these blocks are off by 15.
+        for (x, y, c) in (1..7).flat_map(|x| (1..7).flat_map(move |y| (0..3).map(move |c| (x, y, c)))) {
+            let [made, wanted] = [&above(0), &preview.0[0]].map(|picture| block(picture, x, y, c));
+            assert!((made - wanted).abs() < 10.0, "channel {c} of block {x} {y}: {made} for {wanted}");
+        }
+        assert!(read.iter().all(|frame| frame.buffer().pixels().all(|pixel| pixel[3] == 255)), "no holes");
     }
 
     #[test]
