@@ -1,6 +1,7 @@
 //! The statistics of a pixel's samples, and how those of two disjoint sets of samples are combined.
 use crate::layout::{PixelLight, PixelStats, vec3};
 use crate::math::srgb::luminance;
+use crate::shaders::accumulate::{ASTRAY, MIN_ALBEDO};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -82,11 +83,26 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
         light: PixelLight {
             direct: mean(a.light.direct, b.light.direct),
             indirect_m2: squares([a.light.indirect_m2, b.light.indirect_m2], off),
-            albedo: mean(a.light.albedo, b.light.albedo),
-            remainder: 0,
+            albedo: joined_albedo(a, b, mean(a.light.albedo, b.light.albedo)),
+            remainder: if is_astray(a) && is_astray(b) { ASTRAY } else { 0 },
             ..Default::default()
         },
     }
+}
+
+/// Whether no sample tells what the pixel's glass shows.
+fn is_astray(p: &Pixel) -> bool {
+    p.stats.count == 0 || p.light.remainder & ASTRAY != 0
+}
+
+/// Samples that all went ways that few take give way to others, but where these reflect nothing: as `glsl/film/accumulate.comp` has it.
+fn joined_albedo(a: &Pixel, b: &Pixel, mean: vec3) -> vec3 {
+    let usual = match [a, b].map(is_astray) {
+        [true, false] => b,
+        [false, true] => a,
+        _ => return mean,
+    };
+    std::array::from_fn(|c| if usual.light.albedo[c] > MIN_ALBEDO { usual.light.albedo[c] } else { mean[c] })
 }
 
 /// Index of the pixel's next sample; 0 is the first of the render. It equals the count where all samples in the mean belong to
@@ -129,6 +145,16 @@ mod tests {
             assert_eq!((whole.count, whole.mean, whole.m2), (4, [4.0; 3], [20.0; 3]));
             assert!(light.albedo == [4.0; 3] && (light.indirect_m2 - 20.0).abs() < 1e-4, "{light:?}");
         }
+        // A part that saw nothing of what glass shows, its albedo white, gives way where the other reflects something.
+        let with = |albedo: vec3, remainder: u32| {
+            let mut part = of(&[1.0, 3.0]);
+            (part.light.albedo, part.light.remainder) = (albedo, remainder);
+            part
+        };
+        let (astray, usual) = (with([1.0; 3], ASTRAY), with([0.25, 0.0, 0.5], 0));
+        let light = |a: &Pixel, b: &Pixel| (join(a, b).light.albedo, join(a, b).light.remainder);
+        assert_eq!([light(&astray, &usual), light(&usual, &astray)], [([0.25, 0.5, 0.5], 0); 2]);
+        assert_eq!((light(&astray, &astray), join(&astray, &Pixel::default())), (([1.0; 3], ASTRAY), astray));
         let some = of(&[1.0, 2.0]);
         assert_eq!((join(&some, &Pixel::default()), join(&Pixel::default(), &some)), (some, some));
         assert_eq!(join(&Pixel::default(), &Pixel::default()), Pixel::default());

@@ -86,7 +86,8 @@ vec3 albedo_along(inout PixelLight l, vec4 noted, uint count) {
     bool astray = noted.w == 1.0, others = count > 1u;
     if (others && (astray || (l.remainder & ASTRAY) != 0u)) {
         if (astray) return l.albedo;
-        l.albedo = noted.rgb;
+        // What a channel has got already is not to be divided by nothing.
+        l.albedo = mix(noted.rgb, l.albedo, lessThanEqual(noted.rgb, vec3(MIN_ALBEDO)));
     }
     l.remainder = (l.remainder & ~ASTRAY) | (astray ? ASTRAY : 0u);
     return noted.rgb;

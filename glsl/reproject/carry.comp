@@ -37,6 +37,7 @@ void main() {
             HistoryLight taken = HistoryLight_load(history_light, from);
             l.direct = taken.direct;
             l.albedo = taken.albedo;
+            l.remainder = taken.remainder;
             l.indirect_m2 = still ? taken.indirect_variance : taken.indirect_variance * float(c.count - 1u);
         }
         bool inside = (key >> PIXEL_BITS & FARTHEST) <= FARTHEST / 2u;

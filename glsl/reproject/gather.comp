@@ -151,6 +151,7 @@ void main() {
                 m.light.direct = l.direct;
                 m.light.indirect_m2 = l.indirect_variance;
                 m.light.albedo = l.albedo;
+                m.light.remainder = l.remainder;
             }
         }
     } else {

@@ -196,6 +196,7 @@ void main() {
         HistoryLight h = HistoryLight_zero();
         h.direct = l.direct;
         h.albedo = l.albedo;
+        h.remainder = l.remainder;
         h.indirect_variance = l.indirect_m2 * share / divisor;
         history_light[i] = HistoryLight_words(h);
     }

@@ -256,12 +256,17 @@ bool bsdf_is_delta(Bsdf b) {
     return is_kind(FX_METALLIC, b, BSDF_METALLIC) ? metallic_is_delta(b.metallic) : is_interface(b) && is_smooth(b);
 }
 
-// The probability of the way that bsdf_sample chooses by `u_lobe`, where every lobe is a delta; 1 where light has one way alone.
-float bsdf_chance(Bsdf b, vec3 wo, float u_lobe) {
-    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return metallic_chance(b.metallic, wo, u_lobe);
-    if (!is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC)) return 1.0;
-    float reflected = fresnel_dielectric(abs(wo.z), relative_index(b, wo.z)).x;
-    return u_lobe < reflected ? reflected : 1.0 - reflected;
+// The probability of the way that bsdf_sample chooses by `u_lobe`, where every lobe is a delta: 1 where light has one way alone, and 0 of
+// a way less likely than not.
+float bsdf_share(Bsdf b, vec3 wo, float u_lobe) {
+    float chance = 1.0;
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) {
+        chance = metallic_chance(b.metallic, wo, u_lobe);
+    } else if (is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC)) {
+        float reflected = fresnel_dielectric(abs(wo.z), relative_index(b, wo.z)).x;
+        chance = u_lobe < reflected ? reflected : 1.0 - reflected;
+    }
+    return chance < 0.5 ? 0.0 : chance;
 }
 
 // The albedo that a path of this `throughput` keeps of a surface. Where it came a way that it takes with the probability `share`, what

@@ -55,5 +55,6 @@ Ray eye_ray(vec2 film, Sampler random) {
 // pixels; it is inverted, or the numbers would be those of `sampler_start`.
 uint path_seed(uint pixel, uint index) {
     uint hash = pcg(pixel ^ pcg(~push.constants.seed));
+    if (index > 0xffffu) hash = pcg(hash + (index >> 16)); // MASK_INDEX has room for so many
     return ((FX_INDEPENDENT ? pcg(hash + index) : bitfieldReverse(index)) & MASK_INDEX) | (hash & MASK_HASH) | BY_CHANCE;
 }

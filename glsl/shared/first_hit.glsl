@@ -37,7 +37,7 @@ bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
     sight.way.direction = view.basis * next.wi;
     sight.way.origin = ray_origin(s, sight.way.direction);
     sight.throughput *= next.weight * light_share(s, view.facing, sight.way.direction, next.wi.z);
-    sight.share *= bsdf_chance(bsdf, view.wo, 0.5);
+    sight.share *= bsdf_share(bsdf, view.wo, 0.5);
     if (sight.share < 1.0) sight.albedo = seen_albedo(sight.throughput, vec3(1.0), 1.0);
     return goes_on && largest_channel(sight.throughput) > 0.0;
 }
@@ -45,7 +45,7 @@ bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
 // The first surface that `ray` shows, behind smooth ones, or the sky. Depth and position are as if the way had been straight, so
 // that they change as the image does; a normal that points back along the way tells where in the sky it ends. The albedo is what
 // the light from there is multiplied by on its way. `first` becomes the first hit, smooth or not, and `kept` the albedo that paths
-// keep which begin like this: 1 times the throughput where they choose a way, since their light is then that of either.
+// keep which begin like this: see `seen_albedo`.
 Guide seen_hit(Ray ray, uint seed, out Guide first, out Hit first_hit, out vec3 kept) {
     Sight sight = Sight(ray, 0.0, vec3(1.0), vec3(0.0), 1.0);
     Guide seen;
@@ -53,7 +53,8 @@ Guide seen_hit(Ray ray, uint seed, out Guide first, out Hit first_hit, out vec3 
     uint bounce = 0u;
     // Rays are traced and surfaces read in one place of the code, whose size decides how long the kernels take to compile.
     do {
-        Hit hit = traverse(Segment(sight.way.origin, sight.way.direction, INFINITE_DISTANCE, path_mask_seed(seed, bounce)), push.constants.root);
+        Segment way = Segment(sight.way.origin, sight.way.direction, INFINITE_DISTANCE, path_mask_seed(seed, bounce));
+        Hit hit = traverse(way, push.constants.root);
         seen = Guide_zero();
         seen.object = seen.material = NONE;
         bool sky = hit.triangle == NONE;

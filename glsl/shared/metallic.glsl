@@ -194,8 +194,9 @@ bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out
     return above;
 }
 
-// The probability of the lobe that metallic_sample chooses.
+// The probability of the lobe that metallic_sample chooses of several smooth ones; 1 of a single one, whatever a division makes of it.
 float metallic_chance(Metallic b, vec3 wo, float u_lobe) {
+    if (!has_coat(b) && b.through == vec3(0.0)) return 1.0;
     vec4 odds = metallic_odds(b, wo);
     if (u_lobe < odds.x) return odds.x;
     if (FX_THIN && u_lobe < odds.x + odds.w) return odds.w;

@@ -43,7 +43,8 @@ void save_hit(uint i, Hit hit) {
 }
 
 void save_path(uint i, PathState p, Departure d) {
-    uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) | (d.sharp ? SHARP : 0u) | ((d.shadow.mask_seed & PASSES_WALLS) != 0u ? PASSING : 0u) |
+    uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) | (d.sharp ? SHARP : 0u) |
+                 ((d.shadow.mask_seed & PASSES_WALLS) != 0u ? PASSING : 0u) |
                  min(p.scattered, 2u) << SCATTERED_AT | p.bounce << BOUNCE_AT;
     keep(ORIGIN, i, p.path.origin, floatBitsToUint(p.path.bsdf_pdf));
     keep(DIRECTION, i, p.path.direction, floatBitsToUint(p.path.eta_scale));

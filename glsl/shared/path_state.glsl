@@ -51,7 +51,7 @@ struct PathState {
     float share;     // probability of its way, where smooth ones before these let it take one of two: 0 beyond one less likely than not
     uint closest_rays, any_rays;
     SplitLight light;
-    vec3 albedo;     // what light is multiplied by on its way from what the path sees: see `note_albedo`
+    vec3 albedo;     // what light is multiplied by on its way from what the path sees: see `seen_albedo`
 };
 
 // The rays that leave a surface: whether there is the one towards a light, with what comes along it if nothing blocks it, and
@@ -72,7 +72,6 @@ PathState path_state(vec3 origin, vec3 direction, bool sharp_only, uint seed) {
     Path path = Path(origin, direction, vec3(1.0), 0.0, true, 1.0);
     return PathState(path, Hit(0.0, NONE, NONE, 0.0, 0.0), seed, sharp_only, 0u, 0u, 1.0, 1u, 0u, none, vec3(0.0));
 }
-
 
 // The ray from the camera, or to the next surface.
 Segment next_segment(PathState p) {

@@ -126,9 +126,8 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     d.sharp = d.certainty >= SHARP_PROBABILITY;
     d.shadowed = going && push.constants.light_count > 0u && !smooth_here && largest_channel(d.sampled) > 0.0;
     d.alive = scatter(p.path, s, bsdf, view, random, pair) && going;
-    if (sees && smooth_here) {
-        float chance = bsdf_chance(bsdf, view.wo, sample_2d(random, pair + PAIR_CHOICE).y);
-        p.share *= chance < 0.5 ? 0.0 : chance;
+    if (sees && smooth_here && d.alive) {
+        p.share *= bsdf_share(bsdf, view.wo, sample_2d(random, pair + PAIR_CHOICE).y);
         if (p.share < 1.0) p.albedo = seen_albedo(p.path.throughput, vec3(1.0), 1.0);
     }
     p.scattered += smooth_here ? 0u : 1u;

@@ -108,7 +108,7 @@ bool clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycen
 }
 
 // The number in [0, 1) that a surface's opacity is compared with: over the samples of a pixel one dimension of the sampler for each
-// surface, so that of 2^k samples in a row as many pass as should, to one. Two copies of a triangle on one ray decide independently.
+// surface, so that of the first 2^k samples as many pass as should, to one. Two copies of a triangle on one ray decide independently.
 float mask_number(uint triangle, uint instance, uint seed) {
     uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
     if ((seed & BY_CHANCE) == 0u) return 0.5;

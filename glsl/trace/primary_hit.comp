@@ -64,7 +64,8 @@ void main() {
     Guide shown;
     ThroughLens sum = ThroughLens(Guide_zero(), 0u, 0.0);
     uint k = 0u;
-    // The first ray is that through the middle of the lens. Rays are traced in one place, in a loop that is tested at its end: see shared/first_hit.glsl and shared/traverse.glsl.
+    // The first ray is that through the middle of the lens. Rays are traced in one place, in a loop that is tested at its end: see
+    // shared/first_hit.glsl and shared/traverse.glsl.
     do {
         Camera lens = camera;
         lens.lens_radius = k == 0u ? 0.0 : camera.lens_radius;

@@ -42,8 +42,8 @@ gpu_structs! {
         albedo: vec3,
         /// Variance of one sample; where nothing has moved, as [`PixelLight::indirect_m2`].
         indirect_variance: float,
-        /// Unused.
-        pad: uint,
+        /// As [`PixelLight::remainder`].
+        remainder: uint,
     }
 
     /// Push constants of `glsl/reproject`.

@@ -35,7 +35,8 @@ pub(crate) const INDIRECT_M2: &str = "indirect.m2";
 /// How far the lens blurs what a pixel shows, from 0, sharp, to 1: only in files of cameras with a lens.
 pub(crate) const BLUR: &str = "denoising blur";
 
-/// What rounding took off the means of pixels with thousands of samples: only in files that have such pixels.
+/// What rounding took off the means of pixels with thousands of samples, and whether all samples of a pixel went ways that few take:
+/// only in files that have such pixels.
 const REMAINDERS: [&str; 2] = ["remainder", "light.remainder"];
 
 /// Metadata of samples that are wrong.
@@ -159,7 +160,7 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
     }
 }
 
-/// Only pixels with thousands of samples have any.
+/// Only pixels with thousands of samples, or that show glass, have any.
 fn drop_remainders_of_none(film: &mut Film) {
     let is_zero = |samples: &Samples| matches!(samples, Samples::U32(words) if words.iter().all(|&word| word == 0));
     film.channels.retain(|c| !(REMAINDERS.contains(&c.name.as_str()) && is_zero(&c.samples)));

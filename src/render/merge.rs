@@ -101,8 +101,8 @@ pub struct Gap {
 }
 
 /// Joins the EXR files of renders that differ in nothing but their sample ranges or their seeds. Means and variances are
-/// joined by the rule of Chan, Golub and LeVeque (1979): within rounding, the result is that of one render, and it has the
-/// same bits in whatever order the files are named.
+/// joined by the rule of Chan, Golub and LeVeque (1979): within rounding they are those of one render, and they have the same bits in
+/// whatever order the files are named. Of what glass shows, albedos may weigh samples otherwise than one render does.
 ///
 /// # Errors
 /// [`Error::Input`] when a file cannot be read or does not belong to the others, [`Error::Device`] when there is not enough

@@ -29,7 +29,7 @@ pub struct Rig {
     pub(in crate::scene) hidden: HashSet<u32>,
     /// Copies whose transform has no inverse. They have no other one until a pose places them again.
     pub(in crate::scene) flat: HashSet<u32>,
-    /// Which of the states of all scenes of this process the scene is in: 0 as it was loaded, another number after each change.
+    /// Which of the states of all scenes of this process the scene is in: see [`Scene::serial`].
     pub(in crate::scene) serial: u64,
     /// Copies by the numbers that a pose calls them; [`NONE`] for one that is fixed.
     pub(in crate::scene) placed: Vec<u32>,
@@ -127,8 +127,8 @@ impl Scene {
         self.instances.iter().enumerate().map(mesh_of).collect()
     }
 
-    /// The number of the state that the scene is in: 0 as it was loaded, another one after each [`Scene::apply`] that has changed
-    /// something. No two scenes of a process come to have the same number but by a clone. Arrays that are edited by hand keep it.
+    /// The number of the state that the scene is in: a new one where it is loaded, and after each [`Scene::apply`] that has changed
+    /// something. No two scenes that were loaded in a process have the same number but by a clone. Arrays that are edited by hand keep it.
     pub fn serial(&self) -> u64 {
         self.rig.serial
     }

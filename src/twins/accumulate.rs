@@ -137,7 +137,8 @@ fn albedo_along(l: &mut PixelLight, noted: Vec4, count: u32) -> Vec3 {
         return l.albedo.into();
     }
     if count > 1 && l.remainder & ASTRAY != 0 {
-        l.albedo = noted.truncate().into();
+        let (seen, white) = (noted.truncate(), Vec3::from(l.albedo));
+        l.albedo = Vec3::select(seen.cmple(Vec3::splat(MIN_ALBEDO)), white, seen).into();
     }
     l.remainder = (l.remainder & !ASTRAY) | if astray { ASTRAY } else { 0 };
     noted.truncate()
@@ -193,6 +194,12 @@ mod tests {
             }
             assert_eq!((light[0].albedo, light[0].remainder != 0), ([albedo; 3], alone), "{samples:?}");
         }
+        // Sky beside what a way that few take has brought: 1 of other light, over an albedo of 1, in one of two samples.
+        let (mut stats, mut light) = ([PixelStats::default()], [PixelLight::default()]);
+        let samples = [stray(1.0), [[4.0; 4], [0.0; 4], [0.0; 4]]].concat();
+        fold(&FoldPush { pixels: 1, samples: 2, ..FoldPush::default() }, true, &samples, &mut stats, &mut light);
+        let PixelLight { direct, albedo, .. } = light[0];
+        assert_eq!((stats[0].mean, direct, albedo), ([2.5; 3], [2.0; 3], [0.5; 3]), "nothing is lost");
     }
 
     #[test]

@@ -338,16 +338,18 @@ pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     }
 }
 
-/// The probability of the way that [`bsdf_sample`] chooses by `u_lobe`, where every lobe is a delta; 1 where light has one way alone.
-pub fn bsdf_chance(b: &Bsdf, wo: Vec3, u_lobe: f32) -> f32 {
-    match b.kind {
+/// The probability of the way that [`bsdf_sample`] chooses by `u_lobe`, where every lobe is a delta: 1 where light has one way alone, and 0
+/// of a way less likely than not.
+pub fn bsdf_share(b: &Bsdf, wo: Vec3, u_lobe: f32) -> f32 {
+    let chance = match b.kind {
         BSDF_METALLIC => b.metallic.chance(wo, u_lobe),
         BSDF_DIELECTRIC => {
             let reflected = fresnel_dielectric(wo.z.abs(), relative_index(b, wo.z)).x;
             if u_lobe < reflected { reflected } else { 1.0 - reflected }
         }
         _ => 1.0,
-    }
+    };
+    if chance < 0.5 { 0.0 } else { chance }
 }
 
 /// The albedo that a path of this `throughput` keeps of a surface. Where it came a way that it takes with the probability `share`, what

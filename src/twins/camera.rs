@@ -89,7 +89,10 @@ pub fn eye_ray(frame: &FrameConstants, effects: &Effects, film: Vec2, random: Sa
 
 /// Seed of the alpha masks along a path.
 pub fn path_seed(frame: &FrameConstants, effects: &Effects, pixel: u32, index: u32) -> u32 {
-    let hash = pcg(pixel ^ pcg(!frame.path.seed));
+    let mut hash = pcg(pixel ^ pcg(!frame.path.seed));
+    if index > 0xffff {
+        hash = pcg(hash.wrapping_add(index >> 16)); // MASK_INDEX has room for so many
+    }
     let order = if effects.independent_sampler { pcg(hash.wrapping_add(index)) } else { index.reverse_bits() };
     (order & MASK_INDEX) | (hash & MASK_HASH) | BY_CHANCE
 }
@@ -139,5 +142,10 @@ mod tests {
             let same = (0..4096).zip(seeds(seed)).filter(|(pixel, word)| first[pixel ^ seed as usize] == *word).count();
             assert!(same <= 4, "{same} of 4096"); // one in 16384 by chance
         }
+        let all = |index: u32| -> Vec<u32> {
+            (0..4096).map(|pixel| path_seed(&FrameConstants::default(), &Effects::default(), pixel, index)).collect()
+        };
+        let same = all(7).iter().zip(all(65_543)).filter(|(a, b)| *a == b).count();
+        assert!(same <= 4, "{same} of 4096 beyond 65,536 samples");
     }
 }

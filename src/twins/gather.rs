@@ -1,6 +1,6 @@
 //! Twin of `glsl/reproject/gather.comp`.
 use super::reproject::{Handed, Reprojection, dropped, surface_of};
-use crate::layout::{Guide, NONE, PixelLight, PixelStats, SurfacePoint};
+use crate::layout::{Guide, HistoryLight, NONE, PixelLight, PixelStats, SurfacePoint};
 use crate::math::srgb::luminance;
 use crate::render::Carried;
 use crate::shaders::gather::{MOST_M2, STEPS};
@@ -70,8 +70,8 @@ impl Reprojection<'_> {
             match self.still() {
                 true if count > 0 => {
                     let stats = PixelStats { mean: h.mean, m2: h.variance, count, ..Default::default() };
-                    let (direct, albedo, indirect_m2) = (l.direct, l.albedo, l.indirect_variance);
-                    (word, stats, PixelLight { direct, albedo, indirect_m2, ..Default::default() })
+                    let HistoryLight { direct, albedo, indirect_variance: indirect_m2, remainder, .. } = *l;
+                    (word, stats, PixelLight { direct, albedo, indirect_m2, remainder, ..Default::default() })
                 }
                 true => nothing(word),
                 false => self.take(handed, guide, points[pixel], pixel).unwrap_or_else(nothing),

@@ -224,8 +224,11 @@ impl Metallic {
         LobeSample { wi, weight: Vec3::splat(weight), delta, scattered: own.z.min(wi.z) > GRAZING }
     }
 
-    /// The probability of the lobe that [`Self::sample`] chooses.
+    /// The probability of the lobe that [`Self::sample`] chooses of several smooth ones; 1 of a single one.
     pub fn chance(&self, wo: Vec3, u_lobe: f32) -> f32 {
+        if self.coat == 0.0 && self.through == Vec3::ZERO {
+            return 1.0;
+        }
         let [coat, specular, diffuse, through] = self.odds(wo).to_array();
         match u_lobe {
             u if u < coat => coat,

@@ -9,7 +9,7 @@ use crate::shaders::shared::path_step::{
     PAIRS_PER_BOUNCE,
 };
 use crate::twins::bsdf::{
-    Bsdf, bsdf_albedo, bsdf_chance, bsdf_evaluate, bsdf_gloss, bsdf_is_delta, bsdf_lets_light_through, bsdf_sample,
+    Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_gloss, bsdf_is_delta, bsdf_lets_light_through, bsdf_sample, bsdf_share,
     relative_index, seen_albedo,
 };
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
@@ -118,8 +118,7 @@ impl Seen {
         if self.scattered > 0 || self.share == 0.0 {
             return;
         }
-        let chance = bsdf_chance(&p.bsdf, p.view.wo, u_lobe);
-        self.share *= if chance < 0.5 { 0.0 } else { chance };
+        self.share *= bsdf_share(&p.bsdf, p.view.wo, u_lobe);
         if self.share < 1.0 {
             self.albedo = seen_albedo(throughput, Vec3::ONE, 1.0);
         }
@@ -276,7 +275,11 @@ impl Tracer<'_> {
         path.throughput.max_element() > 0.0
     }
 
-    fn survives_roulette(&self, path: &mut Path, random: Sampler, pair: u32) -> bool {
+    fn survives_roulette(&self, path: &mut Path, random: Sampler, bounce: u32) -> bool {
+        let (least, pair) = (self.frame.path.roulette_depth, PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce);
+        if !self.effects.roulette || least == 0 || bounce + 1 < least {
+            return true;
+        }
         let q = (path.throughput.max_element() * path.eta_scale).min(MAX_SURVIVAL);
         if sample_2d(random, pair + PAIR_ROULETTE).x >= q {
             return false;
@@ -333,14 +336,11 @@ impl Tracer<'_> {
                     (certain, choice) = (sharp * light, chosen);
                 }
             }
-            let goes_on = self.scatter(&mut path, &p, random);
-            seen.pass(&p, path.throughput, sample_2d(random, pair + PAIR_CHOICE).y);
-            if !goes_on || ends {
+            if !self.scatter(&mut path, &p, random) || ends {
                 break;
             }
-            let least = self.frame.path.roulette_depth;
-            let roulette = self.effects.roulette && least > 0 && bounce + 1 >= least;
-            if roulette && !self.survives_roulette(&mut path, random, pair) {
+            seen.pass(&p, path.throughput, sample_2d(random, pair + PAIR_CHOICE).y);
+            if !self.survives_roulette(&mut path, random, bounce) {
                 break;
             }
         }

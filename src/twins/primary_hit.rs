@@ -4,7 +4,7 @@ use crate::math::hash::unit_interval;
 use crate::scene::Scene;
 use crate::shaders::primary_hit::LENS_RAYS;
 use crate::shaders::shared::segment::STRONGER_WAY;
-use crate::twins::bsdf::{bsdf_albedo, bsdf_chance, bsdf_is_delta, bsdf_sample, seen_albedo};
+use crate::twins::bsdf::{bsdf_albedo, bsdf_is_delta, bsdf_sample, bsdf_share, seen_albedo};
 use crate::twins::camera::{Ray, camera_ray, film_from_pixel, lens_blur};
 use crate::twins::light::INFINITE_DISTANCE;
 use crate::twins::surface::{View, facing_of, light_share, side_of, surface_at, surface_bsdf, view_of};
@@ -132,7 +132,7 @@ impl Sight {
         let direction = basis * next.wi;
         self.way = Ray { origin: s.ray_origin(direction), direction };
         self.throughput *= next.weight * light_share(&s, &facing, direction, next.wi.z);
-        self.share *= bsdf_chance(&bsdf, wo, 0.5);
+        self.share *= bsdf_share(&bsdf, wo, 0.5);
         if self.share < 1.0 {
             self.albedo = seen_albedo(self.throughput, Vec3::ONE, 1.0);
         }

@@ -251,8 +251,9 @@ impl Reprojection<'_> {
             let SurfacePoint { triangle, instance, weights, .. } = self.numbered_anew(at);
             let mean = s.mean;
             handed.records.push(History { triangle, instance, weights, mean, variance, noise, resting });
-            let (direct, albedo, indirect_variance) = (l.direct, l.albedo, of_one(l.indirect_m2));
-            handed.light.push(HistoryLight { direct, albedo, indirect_variance, ..Default::default() });
+            let PixelLight { direct, albedo, remainder, .. } = l;
+            let indirect_variance = of_one(l.indirect_m2);
+            handed.light.push(HistoryLight { direct, albedo, indirect_variance, remainder, ..Default::default() });
         }
         handed
     }
@@ -450,8 +451,9 @@ impl Reprojection<'_> {
             }
             let of_all = |variance: f32| if self.still() { variance } else { variance * (count - 1) as f32 };
             let stats = PixelStats { mean: h.mean, m2: h.variance.map(of_all), count, ..Default::default() };
-            let (direct, albedo, indirect_m2) = (l.direct, l.albedo, of_all(l.indirect_variance));
-            (stats, PixelLight { direct, albedo, indirect_m2, ..Default::default() })
+            let HistoryLight { direct, albedo, remainder, .. } = *l;
+            let indirect_m2 = of_all(l.indirect_variance);
+            (stats, PixelLight { direct, albedo, indirect_m2, remainder, ..Default::default() })
         };
         winner.iter_mut().zip(points).map(begin).collect()
     }

@@ -4,8 +4,9 @@ use crate::error::{Error, Result};
 use crate::image::{self, Film, WriteOptions, output};
 use ::image::codecs::gif::{GifEncoder, Repeat};
 use ::image::imageops::dither;
-use ::image::{Delay, DynamicImage, Frame, RgbImage, RgbaImage};
+use ::image::{Delay, DynamicImage, Frame, RgbImage, Rgba, RgbaImage};
 use color_quant::NeuQuant;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Pixels of the longer edge at most.
@@ -21,6 +22,9 @@ pub fn check(path: &Path) -> Result<()> {
     }
     Err(Error::Usage(format!("--preview {}: a preview goes to a .gif", path.display())))
 }
+
+/// Of a file.
+const COLORS: usize = 256;
 
 /// Of RGBA.
 const CHANNELS: usize = 4;
@@ -80,17 +84,32 @@ impl Preview {
         shown.iter().zip(ends).try_for_each(|(&frame, end)| {
             let time = (hundredths(end) - hundredths(frame)).clamp(2.0, 60_000.0);
             let delay = Delay::from_numer_denom_ms(10 * time as u32, 1);
-            encoder.encode_frame(Frame::from_parts(dithered(&self.0[frame], &palette), 0, 0, delay))
+            let picture = &self.0[frame];
+            let shown = palette.as_ref().map_or_else(|| picture.clone(), |palette| dithered(picture, palette));
+            encoder.encode_frame(Frame::from_parts(shown, 0, 0, delay))
         })
     }
 
-    /// The 256 colours of all frames: with others for each, what stands still would change its colour.
-    fn palette(&self) -> NeuQuant {
+    /// The 256 colours of all frames: with others for each, what stands still would change its colour. None where there are no more.
+    fn palette(&self) -> Option<NeuQuant> {
+        let mut colors = HashSet::new();
+        let mut is_room_for = |pixel: &Rgba<u8>| {
+            colors.insert(*pixel);
+            colors.len() <= COLORS
+        };
+        if self.0.iter().flat_map(|frame| frame.pixels()).all(&mut is_room_for) {
+            return None;
+        }
         let pixels = self.0.iter().map(|frame| frame.len() / CHANNELS).sum::<usize>();
-        let step = pixels.div_ceil(PALETTE_PIXELS).max(1);
+        let mut step = pixels.div_ceil(PALETTE_PIXELS).max(1);
+        // No two rows alike, or all of it would be of the same few columns.
+        let width = self.0.first().map_or(1, |frame| frame.width() as usize);
+        while (2..=step).any(|d| step % d == 0 && width % d == 0) {
+            step += 1;
+        }
         let all = self.0.iter().flat_map(|frame| frame.chunks_exact(CHANNELS));
         let some: Vec<u8> = all.step_by(step).flatten().copied().collect();
-        NeuQuant::new(1, 256, &some)
+        Some(NeuQuant::new(1, COLORS, &some))
     }
 }
 
@@ -111,7 +130,7 @@ fn dithered(picture: &RgbaImage, palette: &NeuQuant) -> RgbaImage {
 mod tests {
     use super::*;
     use ::image::codecs::gif::GifDecoder;
-    use ::image::{AnimationDecoder, GenericImageView, Rgba};
+    use ::image::{AnimationDecoder, GenericImageView};
 
     /// Milliseconds for which each of so many frames is shown.
     fn delays(frames: u32, fps: f64) -> Vec<u32> {
@@ -145,6 +164,11 @@ mod tests {
             assert!((made - wanted).abs() < 10.0, "channel {c} of block {x} {y}: {made} for {wanted}");
         }
         assert!(read.iter().all(|frame| frame.buffer().pixels().all(|pixel| pixel[3] == 255)), "no holes");
+        let few = Preview(vec![RgbaImage::from_fn(17, 9, |x, y| Rgba([11 * x as u8, 20, 28 * y as u8, 255])); 2]);
+        let mut bytes = Vec::new();
+        few.encode(&mut bytes, 24.0).unwrap();
+        let read = GifDecoder::new(std::io::Cursor::new(bytes)).unwrap().into_frames().collect_frames().unwrap();
+        assert!(read.iter().all(|frame| frame.buffer() == &few.0[0]), "153 colours");
     }
 
     #[test]

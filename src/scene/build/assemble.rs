@@ -94,6 +94,7 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     scene.rig.name(description, &scene.materials);
     scene.rig.content = scene.content.clone();
     scene.rig.rest = posed(scene, Fingerprint::default());
+    scene.rig.renew_serial();
     Ok(())
 }
 
