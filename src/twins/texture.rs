@@ -129,7 +129,8 @@ mod tests {
     #[test]
     fn surfaces_ways_and_pixels_decide_independently() {
         let cell = |u: f32| (16.0 * u) as usize;
-        let pairs: [(&str, fn(u32) -> [f32; 2]); 4] = [
+        type Numbers = fn(u32) -> [f32; 2];
+        let pairs: [(&str, Numbers); 4] = [
             ("surfaces", |i| [5, 6].map(|triangle| mask_number(triangle, NONE, mask_seed(seed(9, i), 0)))),
             ("instances", |i| [0, 1].map(|instance| mask_number(5, instance, mask_seed(seed(9, i), 0)))),
             ("ways", |i| [0, 1].map(|way| mask_number(5, NONE, mask_seed(seed(9, i), way)))),

@@ -339,7 +339,7 @@ fn new_samples_thin_age() {
 fn agreeing([a, b]: &[Begun; 2]) -> usize {
     let close = |a: f32, b: f32| a == b || (a - b).abs() <= 1e-3 * (a.abs() + b.abs()) + 1e-5;
     let values = |(s, l): &(PixelStats, PixelLight)| {
-        [s.mean, s.m2, l.direct, l.albedo, [l.indirect_m2, s.count as f32, 0.0]].concat()
+        [s.mean, s.m2, l.direct, l.albedo, [l.indirect_m2, s.count as f32, (l.remainder >> 31) as f32]].concat()
     };
     let alike = |i: &usize| {
         let [of_a, of_b] = [values(&a.1[*i]), values(&b.1[*i])];
@@ -352,6 +352,27 @@ fn agreeing([a, b]: &[Begun; 2]) -> usize {
 fn kernels_agree_with_their_twin() {
     let gpu = gpu();
     WAYS.into_iter().for_each(|way| agree(&gpu, Reproject { reproject_samples: 4, ..by(way) }));
+    assert_silent(&gpu);
+}
+
+#[test]
+fn a_camera_at_rest_knows_what_glass_has_not_shown() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/glass.toml", [49, 33]).with(|s| s.spp = 1);
+    for way in WAYS {
+        let mut film = Film::new(&gpu, &scene, by(way));
+        film.frame(film.camera);
+        let before = film.light();
+        let (astray, camera) = (before.iter().filter(|l| l.remainder != 0).count(), film.camera);
+        let kept = |begun: &Begun| {
+            let same =
+                begun.1.iter().zip(&before).filter(|((stats, l), old)| stats.count > 0 && l.remainder == old.remainder);
+            same.filter(|(_, old)| old.remainder != 0).count()
+        };
+        let begun = both(&mut film, &scene, by(way), camera);
+        assert!(astray > 5, "control: {astray} pixels");
+        assert_eq!(begun.each_ref().map(kept), [astray; 2], "{way:?}");
+    }
     assert_silent(&gpu);
 }
 

@@ -104,7 +104,7 @@ impl Preview {
         let mut step = pixels.div_ceil(PALETTE_PIXELS).max(1);
         // No two rows alike, or all of it would be of the same few columns.
         let width = self.0.first().map_or(1, |frame| frame.width() as usize);
-        while (2..=step).any(|d| step % d == 0 && width % d == 0) {
+        while (2..=step).any(|d| step.is_multiple_of(d) && width.is_multiple_of(d)) {
             step += 1;
         }
         let all = self.0.iter().flat_map(|frame| frame.chunks_exact(CHANNELS));
