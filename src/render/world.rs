@@ -84,7 +84,7 @@ fn parts(scene: &Scene, effects: &Effects) -> Vec<Part> {
     let of_mesh = |(mesh, range): (usize, Range<usize>)| {
         let in_boxes = |i: &usize| effects.spheres && is_sphere(&scene.triangles[*i]);
         // One structure of all spheres, from the first to the last: a ray pays for each structure whose box it meets, and triangles
-        // between spheres have no boxes.
+        // between spheres have empty boxes.
         let ends = [range.clone().find(in_boxes), range.clone().rfind(in_boxes)];
         let spheres = ends[0].zip(ends[1]).map(|(first, last)| Mesh { range: first..last + 1, of_boxes: true, once });
         // What spheres are told by is no triangle that is seen, and lies among those of the mesh.
@@ -99,13 +99,17 @@ fn is_sphere(t: &Triangle) -> bool {
     t.primitive & SPHERE != 0
 }
 
-/// A box around each sphere. Rounding of its faces, and of where a ray meets them, must not cut the sphere.
+/// A box around each sphere. Rounding of its faces, and of where a ray meets them, must not cut the sphere. A triangle after it has the
+/// point in its middle: beside boxes that are no numbers, which Vulkan calls inactive, lavapipe lost spheres.
 fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
     const MARGIN: f32 = 1e-5;
+    let mut middle = [0.0; 3];
     let around = |t: &Triangle| {
         if !is_sphere(t) {
-            return [f32::NAN; 6];
+            let [x, y, z] = middle;
+            return [x, y, z, x, y, z];
         }
+        middle = t.v0;
         let (centre, radius) = (Vec3::from(t.v0), Vec3::from(t.v1).length());
         let reach = (radius + centre.length() * 0.1) * MARGIN + radius;
         let [low, high] = [centre - reach, centre + reach].map(|corner| corner.to_array());
