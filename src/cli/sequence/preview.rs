@@ -23,13 +23,13 @@ pub fn check(path: &Path) -> Result<()> {
     Err(Error::Usage(format!("--preview {}: a preview goes to a .gif", path.display())))
 }
 
-/// Of a file.
+/// Colours that a frame of a GIF has at most.
 const COLORS: usize = 256;
 
-/// Of RGBA.
+/// Numbers of a pixel: red, green, blue and alpha.
 const CHANNELS: usize = 4;
 
-/// Pixels that the colours are chosen by, at most: of more, every so many-th.
+/// Pixels that the colours are chosen by, at most: where there are more, they are taken at equal steps.
 const PALETTE_PIXELS: usize = 1 << 20;
 
 /// Small pictures so far.
@@ -102,7 +102,7 @@ impl Preview {
         }
         let pixels = self.0.iter().map(|frame| frame.len() / CHANNELS).sum::<usize>();
         let mut step = pixels.div_ceil(PALETTE_PIXELS).max(1);
-        // No two rows alike, or all of it would be of the same few columns.
+        // A step that has a factor in common with the width would pass over whole columns of pixels.
         let width = self.0.first().map_or(1, |frame| frame.width() as usize);
         while (2..=step).any(|d| step.is_multiple_of(d) && width.is_multiple_of(d)) {
             step += 1;

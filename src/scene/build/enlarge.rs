@@ -9,8 +9,8 @@ use std::collections::HashMap;
 /// Meshes whose coordinates are all smaller are enlarged.
 const TINY: f64 = 1e-6;
 
-/// Makes tiny meshes that all of their copies enlarge larger, by a power of two, so that nothing is rounded; what is placed where stays as
-/// it is.
+/// Stores tiny meshes larger where all of their copies enlarge them, and makes the copies as much smaller: all stays where it is. It is by a
+/// power of two, so that nothing is rounded.
 pub fn enlarge(sources: &Sources, plan: &mut Plan) {
     let mut least = HashMap::new();
     for copy in &plan.copies {
@@ -26,7 +26,7 @@ pub fn enlarge(sources: &Sources, plan: &mut Plan) {
             enlarged.insert(job.stored_as(), DAffine3::from_scale(DVec3::splat(1.0 / by)));
         }
     }
-    for copy in plan.copies.iter_mut().filter(|_| !enlarged.is_empty()) {
+    for copy in &mut plan.copies {
         if let Some(smaller) = enlarged.get(&copy.stored_as()) {
             (copy.affine, copy.own) = (copy.affine * *smaller, copy.own * *smaller);
         }
