@@ -1,4 +1,5 @@
-//! What a method will take and reach with more samples than a probe took: time is linear in samples, error a power of them.
+//! What a method takes and reaches with other numbers of samples than those of a probe's levels: time is linear in samples, error a
+//! power of them, from one level to the next and behind the last.
 use super::probe::Level;
 
 /// Powers of the number of samples by which error falls. Without a filter it is 1 for independent samples and up to about 1.6 for Sobol
@@ -13,18 +14,17 @@ const USUAL_POWER: f64 = 1.0;
 const LEAST_ERROR: f64 = 1e-12;
 
 /// Time and error of a method by samples per pixel.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Forecast {
     /// Milliseconds that do not depend on samples: of the render, and of its filter.
     start: f64,
     filter: f64,
     /// Milliseconds of a sample of every pixel.
     per_sample: f64,
-    /// Samples at which the error was measured last.
-    spp: f64,
-    error: f64,
-    /// The power up to there, and from there on.
-    powers: [f64; 2],
+    /// Samples and errors that were measured, fewest samples first.
+    measured: Vec<[f64; 2]>,
+    /// The power behind the last of them.
+    power: f64,
     /// Samples that a pixel can have.
     most: f64,
 }
@@ -35,29 +35,28 @@ impl Forecast {
         let last = &levels[levels.len() - 1];
         let error = |level: &Level| level.methods[method].error.max(LEAST_ERROR);
         // The last level may have few samples more than the one before: the noise of both would be the power.
-        let powers = match levels.iter().rfind(|before| 2 * before.spp <= last.spp) {
+        let power = match levels.iter().rfind(|before| 2 * before.spp <= last.spp) {
             Some(before) => {
                 let samples = f64::from(last.spp) / f64::from(before.spp);
                 let power = ((error(before) / error(last)).ln() / samples.ln()).clamp(POWERS[0], POWERS[1]);
-                [power, if before.spp == 1 { power.min(MOST_FROM_FOUR) } else { power }]
+                if before.spp == 1 { power.min(MOST_FROM_FOUR) } else { power }
             }
-            None => [USUAL_POWER; 2],
+            None => USUAL_POWER,
         };
         Self {
             start: last.start_ms,
             filter: last.methods[method].ms,
             per_sample: last.samples_ms / f64::from(last.spp),
-            spp: f64::from(last.spp),
-            error: error(last),
-            powers,
+            measured: levels.iter().map(|level| [f64::from(level.spp), error(level)]).collect(),
+            power,
             most: most.into(),
         }
     }
 
     /// The same where a render of so many samples took this time, its filter not counted.
-    pub fn through(self, spp: u32, ms: f64) -> Self {
+    pub fn through(&self, spp: u32, ms: f64) -> Self {
         let per_sample = ((ms - self.start) / f64::from(spp)).max(f64::MIN_POSITIVE);
-        Self { per_sample, ..self }
+        Self { per_sample, ..self.clone() }
     }
 
     /// GPU time in milliseconds.
@@ -67,8 +66,22 @@ impl Forecast {
 
     /// RelMSE.
     pub fn error_of(&self, spp: u32) -> f64 {
-        let samples = self.spp / f64::from(spp);
-        self.error * samples.powf(self.powers[usize::from(samples < 1.0)])
+        let spp = f64::from(spp);
+        let ([samples, error], power) = self.part(|&[samples, _]| samples >= spp);
+        error * (samples / spp).powf(power)
+    }
+
+    /// The first level that has arrived, and the power that leads there from the one before; else the last, and the power behind it.
+    fn part(&self, arrived: impl Fn(&[f64; 2]) -> bool) -> ([f64; 2], f64) {
+        let measured = &self.measured;
+        let at = measured.iter().position(arrived).unwrap_or(measured.len());
+        match (at.checked_sub(1).map(|before| measured[before]), measured.get(at)) {
+            (Some([few, more_error]), Some(&[samples, error])) => {
+                ([samples, error], (more_error / error).ln() / (samples / few).ln())
+            }
+            (Some(last), None) => (last, self.power),
+            (None, _) => (measured[0], self.power),
+        }
     }
 
     /// Samples that fit a time; none if not even one does.
@@ -79,8 +92,8 @@ impl Forecast {
 
     /// Samples that reach an error; none if more were needed than a pixel can have.
     pub fn samples_for(&self, error: f64) -> Option<u32> {
-        let gain = self.error / error;
-        let samples = (self.spp * gain.powf(1.0 / self.powers[usize::from(gain > 1.0)])).ceil().max(1.0);
+        let ([measured_at, measured], power) = self.part(|&[_, measured]| measured <= error);
+        let samples = (measured_at * (measured / error).powf(1.0 / power)).ceil().max(1.0);
         (samples <= self.most).then_some(samples as u32)
     }
 }
@@ -109,8 +122,8 @@ mod tests {
         assert_eq!((rehearsed.time_of(10), rehearsed.samples_within(135.0)), (155.0, Some(8)));
         assert_eq!((forecast.samples_for(0.0251), forecast.samples_for(9.0)), (Some(16), Some(1)));
         // As fast as Sobol points, and as slow as what is blurred: the powers have ends.
-        let fast = |few| Forecast::new(&[level(few, 1.0), level(4 * few, 1e-9)], 0, MOST).powers;
-        assert_eq!((fast(1), fast(4)), ([POWERS[1], MOST_FROM_FOUR], [POWERS[1]; 2]));
+        let fast = |few| Forecast::new(&[level(few, 1.0), level(4 * few, 1e-9)], 0, MOST).power;
+        assert_eq!((fast(1), fast(4)), (MOST_FROM_FOUR, POWERS[1]));
         let stuck = Forecast::new(&[level(1, 0.1), level(4, 0.1)], 0, MOST);
         assert_eq!(stuck.samples_for(1e-6), None);
         assert_eq!(Forecast::new(&[level(2, 0.1)], 0, MOST).samples_for(0.05), Some(4));
@@ -119,8 +132,25 @@ mod tests {
     #[test]
     fn a_power_is_that_of_twice_the_samples_or_more() {
         let cut = Forecast::new(&[level(1, 0.4), level(4, 0.1), level(5, 0.079)], 0, 5);
-        assert_eq!(cut.powers, Forecast::new(&[level(1, 0.4), level(5, 0.079)], 0, 5).powers);
-        assert_eq!(Forecast::new(&[level(4, 0.1), level(5, 0.1)], 0, 5).powers, [USUAL_POWER; 2]);
+        assert_eq!(cut.power, Forecast::new(&[level(1, 0.4), level(5, 0.079)], 0, 5).power);
+        assert_eq!(Forecast::new(&[level(4, 0.1), level(5, 0.1)], 0, 5).power, USUAL_POWER);
+    }
+
+    /// One sample of a small lamp is off by more than any power of 64 samples tells.
+    #[test]
+    fn what_was_measured_is_foretold() {
+        let levels = [(1, 0.42), (4, 0.03), (16, 0.04), (64, 0.0013)];
+        let forecast = Forecast::new(&levels.map(|(spp, error)| level(spp, error)), 0, MOST);
+        levels.iter().for_each(|&(spp, error)| assert!((forecast.error_of(spp) / error - 1.0).abs() < 1e-9, "{spp}"));
+        // Two samples lie between one and four by the logarithm, as sqrt(.42 * .03) = .1122 does.
+        assert!((forecast.error_of(2) - 0.1122).abs() < 1e-4);
+        assert_eq!(
+            [0.5, 0.42, 0.1123, 0.1122, 0.0301].map(|error| forecast.samples_for(error)),
+            [1, 1, 2, 3, 4].map(Some)
+        );
+        // The first level that reaches it counts; behind the last, error falls as it did to there, or by the largest power.
+        assert_eq!((forecast.samples_for(0.03), forecast.power), (Some(4), POWERS[1]));
+        assert_eq!(forecast.samples_for(0.0013 / 2f64.powf(POWERS[1]) * 1.001), Some(128));
     }
 
     #[test]
