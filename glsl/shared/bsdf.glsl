@@ -269,9 +269,15 @@ float bsdf_share(Bsdf b, vec3 wo, float u_lobe) {
     return chance < 0.5 ? 0.0 : chance;
 }
 
+const float LEAST_TINT = 0.1;
+
 // The albedo that a path of this `throughput` keeps of a surface. Where it came a way that it takes with the probability `share`, what
-// lies the other way counts as white. Roulette may leave a throughput above 1.
-vec3 seen_albedo(vec3 throughput, vec3 albedo, float share) { return min(throughput, vec3(1.0)) * mix(vec3(1.0), albedo, share); }
+// lies the other way counts as white. Roulette may leave a throughput above 1. Deep colours count as LEAST_TINT of their strongest channel
+// at least: what reaches the eye from there by other ways does not have them, and would glow if it were divided by them.
+vec3 seen_albedo(vec3 throughput, vec3 albedo, float share) {
+    vec3 tint = min(throughput, vec3(1.0));
+    return max(tint, vec3(LEAST_TINT * largest_channel(tint))) * mix(vec3(1.0), albedo, share);
+}
 
 // Whether some lobe leaves on the other side.
 bool bsdf_lets_light_through(Bsdf b) {

@@ -6,6 +6,7 @@ use crate::math::fresnel::{fresnel_conductor, fresnel_dielectric};
 use crate::math::microfacet::{microfacet_area, microfacet_d, microfacet_g1, microfacet_sample};
 use crate::math::warp::{INV_PI, warp_cosine_hemisphere};
 use crate::scene::CoatRow;
+use crate::shaders::shared::bsdf::LEAST_TINT;
 use crate::twins::coat::{coat_row_at, row_inside, row_outside};
 use crate::twins::metallic::{Metallic, Parameters};
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
@@ -353,9 +354,10 @@ pub fn bsdf_share(b: &Bsdf, wo: Vec3, u_lobe: f32) -> f32 {
 }
 
 /// The albedo that a path of this `throughput` keeps of a surface. Where it came a way that it takes with the probability `share`, what
-/// lies the other way counts as white.
+/// lies the other way counts as white. Deep colours count as [`LEAST_TINT`] of their strongest channel at least.
 pub fn seen_albedo(throughput: Vec3, albedo: Vec3, share: f32) -> Vec3 {
-    throughput.min(Vec3::ONE) * Vec3::ONE.lerp(albedo, share)
+    let tint = throughput.min(Vec3::ONE);
+    tint.max(Vec3::splat(LEAST_TINT * tint.max_element())) * Vec3::ONE.lerp(albedo, share)
 }
 
 /// Whether some lobe leaves on the other side.

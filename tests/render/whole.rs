@@ -467,25 +467,31 @@ fn apart(gpu: &Gpu, scene: &Loaded) -> (Vec<PixelStats>, Vec<PixelLight>, Vec<Gu
 }
 
 /// Behind the surface of glass of index 1.5 at head on, light is 1 / 1.5^2 of what it is in it. 4 % is mirrored, which counts as white,
-/// by whichever ways the samples of a pixel went: the albedo has no noise of that choice, but where all went the rare way.
+/// by whichever ways the samples of a pixel went: the albedo has no noise of that choice, but where all went the rare way. A tint counts,
+/// but no channel as less than a tenth of the strongest.
 #[test]
 fn what_lies_behind_glass_keeps_its_albedo() {
     let gpu = support::gpu();
-    let scene = Scene::parse(
-        Path::new("glass.toml"),
+    lies_behind_glass(&gpu, [1.0; 3], [1.0; 3]);
+    lies_behind_glass(&gpu, [0.5, 0.001, 0.25], [0.5, 0.05, 0.25]);
+    support::assert_silent(&gpu);
+}
+
+fn lies_behind_glass(gpu: &Gpu, transmission: [f32; 3], tint: [f32; 3]) {
+    let text = format!(
         "[film]\nwidth = 32\nheight = 32\n[camera]\nposition = [0.0, 0.0, 1.0]\nfov = 2.0\n[render]\nspp = 4\nmax_depth = 3\n\
          [environment]\nradiance = 1.0\n[[material]]\nname = 'red'\ncolor = [0.8, 0.2, 0.1]\n[[material]]\nname = 'glass'\n\
-         type = 'dielectric'\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'glass'\n[[mesh]]\nshape = 'rectangle'\n\
-         material = 'red'\ntransform = { translate = [0.0, 0.0, -1.0] }\n",
-    )
-    .unwrap();
-    let (_, light, _) = apart(&gpu, &scene);
-    let expected = [0.8f32, 0.2, 0.1].map(|a| (0.04 + 0.96 * a) / 2.25);
+         type = 'dielectric'\ntransmission = {transmission:?}\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'glass'\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'red'\ntransform = {{ translate = [0.0, 0.0, -1.0] }}\n"
+    );
+    let scene = Scene::parse(Path::new("glass.toml"), &text).unwrap();
+    let (_, light, _) = apart(gpu, &scene);
+    let seen = [0.8f32, 0.2, 0.1].map(|a| (0.04 + 0.96 * a) / 2.25);
+    let expected: [f32; 3] = std::array::from_fn(|c| seen[c] * tint[c]);
     let near = |l: &PixelLight| (0..3).all(|c| (l.albedo[c] - expected[c]).abs() < 2e-3);
     // Of 4 samples all go astray in .04^4 of the pixels; some in 1 - .96^4 = .15 of them.
     let other: Vec<_> = light.iter().filter(|l| !near(l)).map(|l| l.albedo).collect();
     assert!(other.is_empty(), "{} of {} differ from {expected:?}: {:?}", other.len(), light.len(), other[0]);
-    support::assert_silent(&gpu);
 }
 
 /// The image of the walls in a smooth coat, 4 % and more of their light, would be an irradiance of 8 times that light over the
@@ -614,21 +620,27 @@ fn hair(count: usize) -> Loaded {
     )
 }
 
-/// llvmpipe ends the loops of paths whose rays meet tens of thousands of boxes and triangles. Their light is wrong then, mostly too
-/// much: a shadow ray that is cut blocks nothing.
+/// llvmpipe of Mesa 22.3 ends the loops of paths whose rays meet tens of thousands of boxes and triangles. Their light is wrong then,
+/// mostly too much: a shadow ray that is cut blocks nothing. That of 25.0 ends none, and has the picture of a wavefront, which leaves each
+/// ray all that a driver gives to a path.
 #[test]
 fn paths_that_a_driver_ends_early_are_told() {
-    let scenes = [(2_000, false), (150_000, true)].map(|(count, ends)| (count, ends, hair(count)));
-    let tunings = [Tuning::CPU.deals, false].map(|deals| Tuning { deals, ..Tuning::CPU });
-    for (tuning, (count, ends, scene)) in tunings.iter().flat_map(|t| scenes.iter().map(move |s| (t, s))) {
-        let gpu = support::tuned_gpu(*tuning);
+    let rendered = |scene: &Loaded, tuning: Tuning| {
+        let gpu = support::tuned_gpu(tuning);
         let renderer = Renderer::new(&gpu, scene, &scene.settings, Outputs::default()).unwrap();
         Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
-        let (stats, broken) = (support::stats(&renderer), renderer.broken_samples().unwrap());
-        assert_eq!(broken.is_some_and(|broken| broken.count > 0), *ends, "{count}, {tuning:?}: {broken:?}");
-        assert!(stats.iter().all(|s| s.count == 1 && s.mean.iter().all(|v| v.is_finite())), "{count}");
-        assert!(stats.iter().any(|s| s.mean[0] > 0.0), "what was found until then counts");
         support::assert_silent(&gpu);
+        (support::stats(&renderer), renderer.broken_samples().unwrap().is_some_and(|broken| broken.count > 0))
+    };
+    let [short, hairy] = [2_000, 150_000].map(hair);
+    for deals in [Tuning::CPU.deals, false] {
+        let tuning = Tuning { deals, ..Tuning::CPU };
+        assert!(!rendered(&short, tuning).1, "{tuning:?}");
+        let (stats, told) = rendered(&hairy, tuning);
+        let whole = || bits(&stats) == bits(&rendered(&hairy, Tuning { wavefront: true, deals: false, ..tuning }).0);
+        assert!(told || whole(), "{tuning:?}");
+        assert!(stats.iter().all(|s| s.count == 1 && s.mean.iter().all(|v| v.is_finite())));
+        assert!(stats.iter().any(|s| s.mean[0] > 0.0), "what was found until then counts");
     }
 }
 
