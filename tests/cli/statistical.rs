@@ -238,8 +238,60 @@ fn one_percent_of_one_material_is_found_and_its_pixels_render_again_to_the_same_
     assert_eq!(compare(&folder, "c.exr b.exr --evidence found").status.code(), Some(0));
     assert_eq!(names(&folder.path().join("found")), ["notes.txt"]);
     std::fs::write(folder.path().join("nothing/report.json"), "{}").unwrap();
-    assert_eq!(compare(&folder, "c.exr b.exr --evidence nothing").status.code(), Some(0));
+    let refused = compare(&folder, "c.exr b.exr --evidence nothing");
+    complains(&refused, 2, &["--evidence nothing", "replace nothing/report.json", "another folder"]);
     assert_eq!(names(&folder.path().join("nothing")), ["report.json"]);
+}
+
+/// The names of the evidence are those of many a file of one's own.
+#[test]
+fn evidence_replaces_and_removes_only_what_it_wrote() {
+    let folder = folder();
+    let file = |name: &str| folder.path().join(name);
+    let bytes = |names: &[&str]| names.iter().map(|name| std::fs::read(file(name)).unwrap()).collect::<Vec<_>>();
+    write(&folder, "old.exr", 32, 0.02, 1.0, 5);
+    std::fs::write(file("a.png"), "mine").unwrap();
+    let own = ["a.exr", "a.png", "b.exr", "bright.exr", "old.exr"];
+    let before = bytes(&own);
+    // Neither images that differ nor, after them, those that are the same touch a file that is there already.
+    for images in ["bright.exr old.exr", "bright.exr bright.exr"] {
+        complains(&compare(&folder, &format!("{images} --evidence .")), 2, &["--evidence .", "./report.json"]);
+        assert!(names(folder.path()) == own && bytes(&own) == before, "{images}");
+    }
+    // What a comparison wrote the next one replaces, and removes what it makes no more of.
+    let red = Film::from(&image::Picture { width: 32, height: 32, pixels: vec![[0.02; 3]; 1024] });
+    for name in ["errors.exr", "b.hdr"] {
+        image::write(&file(name), &red, &WriteOptions::default()).unwrap();
+    }
+    let evidence = ["a.exr", "a.png", "b.exr", "b.png", "map.png", "replay.sh", "report.html", "report.json"];
+    complains(&compare(&folder, "bright.exr old.exr --evidence found"), 1, &["different"]);
+    assert_eq!(names(&file("found")), evidence);
+    complains(&compare(&folder, "bright.exr b.hdr --errors errors.exr --evidence found"), 1, &["different"]);
+    assert_eq!(names(&file("found")), evidence.map(|name| if name == "b.exr" { "b.hdr" } else { name }));
+    // A file that takes the name of one that is gone is not the comparison's, nor what only lies beside.
+    std::fs::write(file("found/b.exr"), "mine").unwrap();
+    complains(&compare(&folder, "bright.exr old.exr --evidence found"), 2, &["found/b.exr", "found/report.json"]);
+    std::fs::rename(file("found/b.exr"), file("found/notes.txt")).unwrap();
+    // An image that is compared stays, and so do options' files.
+    complains(
+        &compare(&folder, "bright.exr old.exr --html found/b.hdr --evidence found"),
+        2,
+        &["--evidence", "--html"],
+    );
+    complains(&compare(&folder, "bright.exr bare.exr --errors found/b.hdr --evidence found"), 2, &["--errors"]);
+    assert_eq!(compare(&folder, "found/a.exr found/a.exr --evidence found").status.code(), Some(0));
+    assert_eq!(names(&file("found")), ["a.exr", "notes.txt"]);
+    assert!(bytes(&["found/a.exr"]) == bytes(&["bright.exr"]) && bytes(&["found/notes.txt"]) == [b"mine"]);
+    // Whatever a report lists, nothing goes but what a comparison writes.
+    std::fs::write(file("found/report.json"), r#"{"files": ["../a.exr", "notes.txt", "report.json"]}"#).unwrap();
+    assert_eq!(
+        compare(&folder, "old.exr old.exr --evidence found").status.code(),
+        Some(2),
+        "found/a.exr is not listed"
+    );
+    assert_eq!(compare(&folder, "found/a.exr bright.exr --evidence found").status.code(), Some(0));
+    assert_eq!(names(&file("found")), ["a.exr", "notes.txt"]);
+    assert!(bytes(&own) == before);
 }
 
 /// Runs the first command of the evidence.

@@ -46,7 +46,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", requires = "statistical")]
     junit: Option<PathBuf>,
     /// Unless the images are the same, write them, the map, the page, all figures and commands that render the worst pixels
-    /// again to this folder; what an earlier comparison left there goes once they are
+    /// again to this folder; what an earlier comparison left there goes once they are, and no other file is replaced or removed
     #[arg(long, value_name = "FOLDER", requires = "statistical")]
     evidence: Option<PathBuf>,
 }
@@ -119,7 +119,7 @@ fn check_outputs(a: &Path, b: &Path, args: &Args) -> Result<()> {
             outputs.push((option, path));
         }
     }
-    let evidence = args.evidence.as_ref().map_or_else(Vec::new, |folder| evidence::files(folder, [a, b]));
+    let evidence = args.evidence.as_ref().map_or_else(Vec::new, |folder| evidence::touched(folder, [a, b]));
     for path in &evidence {
         outputs.push(("--evidence", path));
     }
@@ -127,7 +127,7 @@ fn check_outputs(a: &Path, b: &Path, args: &Args) -> Result<()> {
     inputs.extend(args.errors.as_deref().map(|errors| ("--errors", errors)));
     check_distinct(&outputs, &inputs)?;
     if let Some(folder) = &args.evidence {
-        evidence::check(folder)?;
+        evidence::check(folder, [a, b])?;
     }
     Ok(())
 }
