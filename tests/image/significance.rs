@@ -145,6 +145,33 @@ fn a_difference_is_found_where_it_is() {
     assert!(!worst.is_empty() && worst.iter().all(|f| outcome.levels[0].different > 0 || inside(f)), "{worst:?}");
 }
 
+/// To look at all pixels for each object that differs would take minutes here.
+#[test]
+fn time_does_not_grow_as_objects_times_pixels() {
+    const EDGE: u32 = 1024;
+    let pixels = (EDGE * EDGE) as usize;
+    let object = |i: u32| i / EDGE / 4 * (EDGE / 4) + i % EDGE / 4;
+    let noise = Noise::Samples { m2: vec![[1e-5; 3]; pixels], count: vec![16.0; pixels] };
+    let mut random = fastrand::Rng::with_seed(8);
+    let mut image = |mean: f32| Estimate {
+        width: EDGE,
+        height: EDGE,
+        mean: (0..pixels).map(|_| [mean + 0.001 * random.f32(); 3]).collect(),
+        noise: noise.clone(),
+        objects: Some((0..EDGE * EDGE).map(object).collect()),
+    };
+    let (a, b) = (image(1.1), image(1.0));
+    let start = std::time::Instant::now();
+    let outcome = test(&a, &b, &Options::default()).unwrap();
+    let objects = outcome.level(Scale::Object).unwrap();
+    assert_eq!((objects.regions, objects.different), (pixels / 16, pixels / 16));
+    let worst = objects.worst[0].place;
+    let first = worst.object.map(|object| [object % (EDGE / 4) * 4, object / (EDGE / 4) * 4]).unwrap();
+    assert_eq!((worst.first, worst.last), (first, first.map(|first| first + 3)));
+    assert!(objects.map.iter().all(|d| (d - 0.1).abs() < 0.01));
+    assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
+}
+
 #[test]
 fn what_points_of_a_net_gain_is_not_lost() {
     // The true standard error of a pixel is 2 / sqrt(12) / 16^1.5 = 0.009 of its mean; m2 says 0.144. Over 1024 pixels,

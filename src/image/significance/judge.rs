@@ -48,6 +48,14 @@ struct Statistic {
     freedom: f64,
 }
 
+/// The test of the channel in which a region differs most surely; see [`Finding`].
+struct Strongest {
+    channel: usize,
+    means: [f64; 2],
+    difference: f64,
+    error: f64,
+}
+
 /// What the samples of a pixel say of one channel.
 struct PixelNoise {
     /// Squared standard error of the difference, by Welch.
@@ -108,7 +116,7 @@ impl<'a> Judge<'a> {
         let mut map = Vec::new();
         if limit.is_some() {
             let mut relative = vec![0.0; p.len()];
-            different.iter().for_each(|r| relative[*r] = found(*r).difference as f32);
+            different.iter().for_each(|r| relative[*r] = self.strongest(&sums, *r).difference as f32);
             let of_region = |pixel| partition.region(pixel).map_or(0.0, |r| relative[r]);
             map = (0..self.images[0].mean.len()).map(of_region).collect();
         }
@@ -242,13 +250,18 @@ impl<'a> Judge<'a> {
         if beyond <= test.error { 1.0 } else { two_sided(beyond / test.error, test.freedom) }
     }
 
+    /// Finding an object's place takes a look at all pixels: only for what is reported.
     fn finding(&self, partition: &Partition, sums: &[Sums], region: usize, p: f64) -> Finding {
+        let Strongest { channel, means, difference, error } = self.strongest(sums, region);
+        Finding { place: partition.place(region), channel, means, difference, error, p }
+    }
+
+    fn strongest(&self, sums: &[Sums], region: usize) -> Strongest {
         let tests = [0, 1, 2].map(|c| self.statistic(sums, region, c));
         let channel = (0..3).min_by(|x, y| self.p(&tests[*x]).total_cmp(&self.p(&tests[*y]))).unwrap_or(0);
         let Statistic { means, unit, error, .. } = tests[channel];
         let relative = |v: f64| if unit > 0.0 { v / unit } else { v.signum() * f64::from(u8::from(v != 0.0)) };
-        let place = partition.place(region);
-        Finding { place, channel, means, difference: relative(means[0] - means[1]), error: relative(error), p }
+        Strongest { channel, means, difference: relative(means[0] - means[1]), error: relative(error) }
     }
 }
 
