@@ -11,7 +11,7 @@ use crate::denoise::filter::{self, FilterSettings, Method};
 use crate::denoise::{self, Colour, Demodulation, Filtered, Recipe, file};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime, Tracing};
-use crate::image::aov::{Aovs, is_noisy};
+use crate::image::aov::{Aov, Aovs, Plane, is_noisy};
 use crate::image::metrics::{self, Metrics};
 use crate::image::source::{Source, Unread};
 use crate::image::{self, Claim, Film, NOISY, Picture};
@@ -164,6 +164,12 @@ fn earlier_filter<'a>(args: &Args, film: &'a Film) -> Option<&'a str> {
     film.metadata.get(image::FILTERED).filter(|_| keeps).map(String::as_str)
 }
 
+/// Whether no pixel of the colour is another one than before: none was filtered or cut, and none that holds no number filled in.
+fn is_as_before(args: &Args, aovs: &Aovs, colour: &Colour) -> bool {
+    let is_same = |stored: Plane| (0..aovs.film.pixels()).all(|i| stored.at(i) == colour.each_ref().map(|c| c[i]));
+    asks_for_nothing(args) && aovs.get(Aov::Colour).is_some_and(is_same)
+}
+
 /// What [`filtered`] returns where the colour stays as it is. Indirect light that was not traced for every pixel is filled in, once.
 fn as_it_is(args: &Args, aovs: &Aovs) -> Option<(Colour, Vec<PassTime>, Vec<String>)> {
     let layers = asks_for_nothing(args).then(|| file::Layers::new(aovs))?;
@@ -230,8 +236,11 @@ struct Clean {
 
 impl Clean {
     /// Puts the filtered colour into the file and keeps the noisy one as a layer. A single grey channel gets the mean of the
-    /// three.
+    /// three. A colour that is as before is not called filtered, and has no noisy one beside it.
     fn new(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Result<Self> {
+        let filter = (!is_as_before(args, aovs, &colour)).then_some(args.filter.name());
+        let keep_as = filter.and_then(|_| aovs.keep_as());
+        let entry = (image::FILTERED, earlier_filter(args, &source.film).or(filter));
         if aovs.colour[0] == aovs.colour[1] {
             let [r, g, b] = &colour;
             let grey: Vec<f32> = r.iter().zip(g).zip(b).map(|((r, g), b)| (r + g + b) / 3.0).collect();
@@ -241,8 +250,7 @@ impl Clean {
         let has_layers = |path: &PathBuf| image::has_layers(path);
         let whole = args.outputs.iter().any(has_layers);
         let shown = args.reference.is_some() || !args.outputs.iter().all(has_layers);
-        let filter = earlier_filter(args, &source.film).unwrap_or(args.filter.name());
-        let encoded = || source.encoded(&channels, aovs.keep_as(), (image::FILTERED, filter));
+        let encoded = || source.encoded(&channels, keep_as, entry);
         Ok(Self {
             exr: whole.then(encoded).transpose()?,
             shown: shown.then(|| source.shown(result_layer(args), &channels)).transpose()?,

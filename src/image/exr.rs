@@ -148,8 +148,8 @@ pub(super) struct Replacement<'a> {
     pub(super) channels: &'a [(&'a str, &'a [f32])],
     /// The layer in which the old samples are kept, if they are.
     pub(super) keep_as: Option<&'a str>,
-    /// Key and value of an entry of metadata to add.
-    pub(super) entry: (&'a str, &'a str),
+    /// Key and value of an entry of metadata to set; one without a value is removed.
+    pub(super) entry: (&'a str, Option<&'a str>),
 }
 
 /// Encodes what [`decode_parts`] has made of a file with new samples. Everything else is kept except the compression, which becomes
@@ -195,13 +195,14 @@ fn whole(parts: &FlatImage, film: &Film) -> FlatImage {
     image
 }
 
-/// Sets an attribute for the whole file and removes it from the parts, to which the reader may have assigned it.
-fn set_entry(image: &mut FlatImage, (key, value): (&str, &str)) {
+/// Sets or removes an attribute for the whole file and removes it from the parts, to which the reader may have assigned it.
+fn set_entry(image: &mut FlatImage, (key, value): (&str, Option<&str>)) {
     let name = text(&format!("{PREFIX}{key}"));
     for part in &mut image.layer_data {
         part.attributes.other.remove(&name);
     }
-    image.attributes.other.insert(name, AttributeValue::Text(text(value)));
+    image.attributes.other.remove(&name);
+    image.attributes.other.extend(value.map(|value| (name, AttributeValue::Text(text(value)))));
 }
 
 /// Makes a channel without samples, with the same view and component in another layer.

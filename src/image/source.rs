@@ -88,12 +88,12 @@ impl Source {
         Ok(self.film.as_rec709(Picture::of_planes(claim.size, &[r?, g?, b?])))
     }
 
-    /// Encodes an EXR file of everything, with new samples and another entry of metadata. The old samples are kept in the layer
-    /// `keep_as`, if one is named.
+    /// Encodes an EXR file of everything, with new samples and another entry of metadata, or without that entry. The old samples are
+    /// kept in the layer `keep_as`, if one is named.
     ///
     /// # Errors
     /// [`Error::Input`] when the file holds something that cannot be written again.
-    pub fn encoded(&self, channels: &Replaced, keep_as: Option<&str>, entry: (&str, &str)) -> Result<Vec<u8>> {
+    pub fn encoded(&self, channels: &Replaced, keep_as: Option<&str>, entry: (&str, Option<&str>)) -> Result<Vec<u8>> {
         let with = exr::Replacement { channels, keep_as, entry };
         let encoded = match &self.parts {
             Some(parts) => super::contained(|| exr::replace(parts, &self.film, &with)),

@@ -225,6 +225,12 @@ fn that_a_filter_is_left_out_is_told() {
     assert!(told(&words).contains("was filtered (atrous), and this one will not be: add --denoise atrous"));
     let [filtered, quiet] = [told(&format!("{words} --denoise atrous")), told(&format!("{words} --quiet"))];
     assert!(!filtered.contains("was filtered") && quiet.is_empty(), "{filtered}{quiet}");
+    // A file that the filter none has made is not filtered.
+    well(render(&folder, "--spp 2 -o d.exr"));
+    well(run(&folder, "filter d.exr --filter none --quiet -o none.exr"));
+    well(run(&folder, "merge b.exr none.exr -o m.exr"));
+    let resumed = told(&words.replace("a.exr", "none.exr"));
+    assert!(!resumed.contains("filtered"), "{resumed}");
 }
 
 #[test]

@@ -35,7 +35,7 @@ fn rewritten(source: &Source, folder: &TempDir) -> (Film, PathBuf) {
         (0..3).map(|c| (0..source.film.pixels()).map(|i| colour.at(i)[c] + 0.25).collect()).collect();
     let channels: Vec<_> = aovs.colour.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
     let path = folder.path().join("clean.exr");
-    std::fs::write(&path, source.encoded(&channels, None, ("filtered", "none")).unwrap()).unwrap();
+    std::fs::write(&path, source.encoded(&channels, None, ("filtered", Some("none"))).unwrap()).unwrap();
     assert_eq!(source.shown(None, &channels).unwrap(), shown(&path), "what is shown needs no file");
     (Source::read(&path).unwrap().film, path)
 }
@@ -86,7 +86,7 @@ fn what_was_there_stays_in_a_layer_of_the_same_part() {
     assert_eq!(aovs.keep_as(), Some("Noisy Image"));
     let channels: Vec<_> = aovs.colour.into_iter().map(|name| (name, &[7.0; 12][..])).collect();
     let path = folder.path().join("clean.exr");
-    std::fs::write(&path, source.encoded(&channels, aovs.keep_as(), ("filtered", "none")).unwrap()).unwrap();
+    std::fs::write(&path, source.encoded(&channels, aovs.keep_as(), ("filtered", Some("none"))).unwrap()).unwrap();
     let clean = Source::read(&path).unwrap();
     assert_eq!(source.shown(None, &channels).unwrap(), shown(&path));
     assert_eq!(values(&clean.film, "View.Combined.G"), [7.0; 12]);
@@ -94,8 +94,12 @@ fn what_was_there_stays_in_a_layer_of_the_same_part() {
     let noisy = |aovs: &Aovs, i: usize| aovs.get(Aov::Colour).unwrap().at(i);
     assert!((0..12).all(|i| noisy(&again, i) == noisy(&aovs, i)), "it is what is filtered next");
     assert_eq!((again.colour, again.keep_as()), (aovs.colour, None));
-    std::fs::write(&path, clean.encoded(&channels, None, ("filtered", "atrous")).unwrap()).unwrap();
-    assert_eq!(Source::read(&path).unwrap().film.metadata["filtered"], "atrous");
+    std::fs::write(&path, clean.encoded(&channels, None, ("filtered", Some("atrous"))).unwrap()).unwrap();
+    let filtered = Source::read(&path).unwrap();
+    assert_eq!(filtered.film.metadata["filtered"], "atrous");
+    std::fs::write(&path, filtered.encoded(&[], None, ("filtered", None)).unwrap()).unwrap();
+    let bare = Source::read(&path).unwrap().film;
+    assert!(!bare.metadata.contains_key("filtered") && bare.channels == filtered.film.channels);
 }
 
 #[test]
