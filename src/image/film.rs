@@ -233,7 +233,7 @@ impl Film {
     }
 
     fn colour(&self) -> Option<[&Channel; 3]> {
-        let coloured: Vec<_> = self.coloured().collect();
+        let coloured = self.coloured();
         let clean = |l: &&&str| !split(l).1.eq_ignore_ascii_case(NOISY);
         let only = || coloured.iter().find(clean).filter(|_| coloured.iter().filter(clean).count() == 1);
         match self.pictures()[..] {
@@ -246,28 +246,39 @@ impl Film {
         }
     }
 
-    fn coloured(&self) -> impl Iterator<Item = &str> {
-        self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some())
+    /// The layers with R, G and B, sorted; one look at each channel, since files may hold thousands.
+    fn coloured(&self) -> Vec<&str> {
+        let mut held = BTreeMap::<&str, [bool; 3]>::new();
+        for (layer, component) in self.channels.iter().map(|c| split(&c.name)) {
+            let of_layer = held.entry(layer).or_default();
+            ["R", "G", "B"].iter().zip(of_layer).for_each(|(c, has)| *has |= component.eq_ignore_ascii_case(c));
+        }
+        held.into_iter().filter(|(_, has)| *has == [true; 3]).map(|(layer, _)| layer).collect()
+    }
+
+    fn usual(&self) -> Vec<&str> {
+        self.coloured().into_iter().filter(|layer| is_usual(layer)).collect()
     }
 
     /// The layer of the colour, by one of the names that programs give it; several where the view layers of a file have one of the same
     /// name each.
     fn pictures(&self) -> Vec<&str> {
-        let usual = || self.coloured().filter(|layer| is_usual(layer));
-        if let Some(composite) = usual().find(|layer| is_composite(split(layer).0)) {
+        let usual = self.usual();
+        if let Some(composite) = usual.iter().find(|layer| is_composite(split(layer).0)) {
             return vec![composite];
         }
-        let Some(first) = usual().next() else { return Vec::new() };
+        let Some((&first, others)) = usual.split_first() else { return Vec::new() };
         let same = |layer: &&str| split(layer).1.eq_ignore_ascii_case(split(first).1);
-        let others = usual().filter(|layer| *layer != first).filter(same);
+        let others = others.iter().copied().filter(same);
         let others = others.filter(|_| !first.is_empty() && !first.to_lowercase().ends_with(".main"));
         [first].into_iter().chain(others).collect()
     }
 
     /// Whether `layer` is of another view layer than `view`, where several have colours of their own, as Blender's have.
     pub(super) fn is_other_view(&self, layer: &str, view: &str) -> bool {
-        let (own, pictures) = (split(layer).0, self.coloured().filter(|layer| is_usual(layer)));
-        let views: BTreeSet<_> = pictures.map(|layer| split(layer).0).filter(|view| !view.is_empty()).collect();
+        let (own, pictures) = (split(layer).0, self.usual());
+        let views: BTreeSet<_> =
+            pictures.into_iter().map(|layer| split(layer).0).filter(|view| !view.is_empty()).collect();
         own != view && views.contains(own) && views.iter().filter(|view| !is_composite(view)).count() > 1
     }
 

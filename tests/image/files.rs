@@ -1,6 +1,7 @@
 //! Tests that films survive being written to files and read back.
 use std::path::Path;
 use tallow::error::Error;
+use tallow::image::aov::{Aov, Aovs, Names};
 use tallow::image::{self, Film, Samples, WriteOptions, output, tone::ToneMap};
 
 /// Bit patterns that a lossy or converting writer would change: negative zero, denormals, infinities, a NaN with payload.
@@ -192,6 +193,23 @@ fn the_colour_is_found_under_the_names_of_other_programs() {
     // Two layers match by their last part, so that neither is meant.
     assert!(film(&["a.light", "b.light"]).picture(Some("light")).is_err());
     assert_eq!(film(&["a.light", "light"]).picture(Some("light")).unwrap().pixels[0][0], 1.0);
+}
+
+/// To look at all channels for each layer would take minutes here.
+#[test]
+fn layers_of_many_are_found_in_time() {
+    const MANY: usize = 20_000;
+    let mut film = Film::new(1, 1);
+    (0..MANY).for_each(|i| film.add_vec3(&format!("light {i}"), ["R", "G", "B"], &[[i as f32; 3]]));
+    let start = std::time::Instant::now();
+    assert!(film.picture(None).is_err(), "none is the colour");
+    film.add_vec3("View.Combined", ["R", "G", "B"], &[[0.5; 3]]);
+    for (layer, value) in [(None, 0.5), (Some("light 19999"), 19999.0), (Some("combined"), 0.5)] {
+        assert_eq!(film.picture(layer).unwrap().pixels, [[value; 3]], "{layer:?}");
+    }
+    let aovs = Aovs::find(&film, &Names::from([(Aov::Albedo, "light 7".to_owned())])).unwrap();
+    assert_eq!(aovs.scalar(Aov::Albedo, 0), Some(7.0));
+    assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
 }
 
 fn write_and_read(name: &str, pixels: &[[f32; 3]], options: &WriteOptions) -> Vec<[f32; 3]> {
