@@ -227,6 +227,9 @@ impl Film {
         if let (None, [_, _, ..]) = (layer, &self.pictures()[..]) {
             return format!("holds several pictures: {}", self.pictures().join(", "));
         }
+        if layer.is_none() && self.has_chroma() {
+            return "holds luminance and chroma (Y, RY, BY), which is not supported: save it as R, G, B".to_owned();
+        }
         let wanted = layer.map_or("no colour (R, G, B)".to_owned(), |name| format!("no single layer {name:?}"));
         let names: Vec<_> = self.channels.iter().map(|c| c.name.as_str()).collect();
         format!("holds {wanted}; its channels are {}", names.join(", "))
@@ -241,9 +244,14 @@ impl Film {
             [layer] => self.triple(layer, ["R", "G", "B"]),
             [] => match only() {
                 Some(layer) => self.triple(layer, ["R", "G", "B"]),
-                None => self.grey(|c| c.name == "Y"),
+                None => self.grey(|c| c.name == "Y").filter(|_| !self.has_chroma()),
             },
         }
+    }
+
+    /// Whether it holds what makes a colour of the luminance Y.
+    fn has_chroma(&self) -> bool {
+        self.channel("Y").is_some() && self.channels.iter().any(|c| ["RY", "BY"].contains(&c.name.as_str()))
     }
 
     /// The layers with R, G and B, sorted; one look at each channel, since files may hold thousands.

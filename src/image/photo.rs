@@ -5,7 +5,10 @@ use super::film::{Film, Picture, Samples};
 use super::tone;
 use crate::math::srgb::linear_from_srgb;
 use crate::memory;
-use image::codecs::{hdr::HdrEncoder, png::PngEncoder};
+use image::codecs::{
+    hdr::{HdrDecoder, HdrEncoder},
+    png::PngEncoder,
+};
 use image::{
     ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat, ImageReader,
     Limits, Rgb,
@@ -105,7 +108,8 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     film_from(&picture(bytes)?)
 }
 
-/// Decodes a PNG, JPEG, HDR, TGA or BMP file without converting its values.
+/// Decodes a PNG, JPEG, HDR, TGA or BMP file without converting its values, but for what the header of an HDR says that they were
+/// multiplied by.
 ///
 /// # Errors
 /// A message about what is wrong with the data, or that they need more memory than is free.
@@ -113,7 +117,28 @@ pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
     let claim = claim(bytes)?;
     check_end(bytes)?;
     memory::check(claim.bytes)?;
-    reader(bytes, TEXTS + claim.bytes)?.decode().map_err(plain)
+    let exposure = exposure(bytes)?;
+    let mut picture = reader(bytes, TEXTS + claim.bytes)?.decode().map_err(plain)?;
+    if let (DynamicImage::ImageRgb32F(picture), Some(exposure)) = (&mut picture, exposure) {
+        picture.pixels_mut().flat_map(|p| p.0.iter_mut().zip(exposure)).for_each(|(v, exposure)| *v /= exposure);
+    }
+    Ok(picture)
+}
+
+/// What the radiance in an HDR file was multiplied by, all lines together; `None` for other files.
+fn exposure(bytes: &[u8]) -> Result<Option<[f32; 3]>, String> {
+    if format(bytes) != Some(ImageFormat::Hdr) {
+        return Ok(None);
+    }
+    let header = HdrDecoder::new(reader(bytes, TEXTS)?.into_inner()).map_err(plain)?.metadata();
+    let (all, (r, g, b)) = (header.exposure.unwrap_or(1.0), header.color_correction.unwrap_or((1.0, 1.0, 1.0)));
+    let exposure = [r, g, b].map(|own| own * all);
+    match exposure.iter().find(|v| !(v.is_finite() && **v > 0.0)) {
+        None => Ok(Some(exposure)),
+        Some(wrong) => Err(format!(
+            "was multiplied by {wrong}, by its lines EXPOSURE and COLORCORR: correct these to positive numbers, or remove them"
+        )),
+    }
 }
 
 /// What is told of a file that is no image, or of a kind that is not read.

@@ -212,6 +212,22 @@ fn layers_of_many_are_found_in_time() {
     assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
 }
 
+#[test]
+fn luminance_and_chroma_are_no_grey() {
+    let film = |names: &[&str]| {
+        let mut film = Film::new(1, 1);
+        names.iter().for_each(|name| film.add(*name, Samples::F32(vec![0.5])));
+        film
+    };
+    let chroma = film(&["BY", "RY", "Y"]);
+    let line = chroma.picture(None).unwrap_err();
+    assert_eq!(line, "holds luminance and chroma (Y, RY, BY), which is not supported: save it as R, G, B");
+    assert_eq!(chroma.picture(Some("Y")).unwrap().pixels, [[0.5; 3]], "it is asked for");
+    for names in [&["Y", "A"][..], &["B", "BY", "G", "R", "RY", "Y"]] {
+        assert_eq!(film(names).picture(None).unwrap().pixels, [[0.5; 3]], "{names:?}");
+    }
+}
+
 fn write_and_read(name: &str, pixels: &[[f32; 3]], options: &WriteOptions) -> Vec<[f32; 3]> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -261,6 +277,33 @@ fn both_signatures_of_hdr_are_read_alike() {
     assert!(a == b && a[17][0] > 16.0, "{a:?} {b:?}");
     std::fs::write(&path, other).unwrap();
     assert!(image::read(&path).unwrap().picture(None).unwrap().pixels == a);
+}
+
+/// By the format's definition, radiance is what the pixels hold over the product of all lines.
+#[test]
+fn hdr_is_divided_by_the_exposures_of_its_header() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.hdr");
+    let mut film = Film::new(9, 2);
+    film.add_vec3("", ["R", "G", "B"], &std::array::from_fn::<_, 18, _>(|i| [i as f32, 0.25, 2.0]));
+    image::write(&path, &film, &WriteOptions::default()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let decoded = |signature: &str, lines: &str| {
+        let rest = bytes.strip_prefix(b"#?RADIANCE\n").unwrap();
+        image::decode(&[signature.as_bytes(), lines.as_bytes(), rest].concat())
+            .map(|film| film.picture(None).unwrap().pixels)
+    };
+    let plain = decoded("#?RADIANCE\n", "").unwrap();
+    for signature in ["#?RADIANCE\n", "#?RGBE\n"] {
+        let halved = decoded(signature, "EXPOSURE=2.0\n").unwrap();
+        assert!(halved.iter().zip(&plain).all(|(half, whole)| *half == whole.map(|v| v / 2.0)), "{halved:?}");
+        let all = decoded(signature, "EXPOSURE=2.0\nEXPOSURE= 4\nCOLORCORR=1 0.5 2\n").unwrap();
+        assert!(all.iter().zip(&plain).all(|(all, [r, g, b])| *all == [r / 8.0, g / 4.0, b / 16.0]), "{all:?}");
+    }
+    for wrong in ["EXPOSURE=0\n", "EXPOSURE=-1\n", "EXPOSURE=inf\n", "EXPOSURE=nan\n", "COLORCORR=1 0 1\n"] {
+        let line = decoded("#?RADIANCE\n", wrong).unwrap_err();
+        assert!(line.contains("EXPOSURE and COLORCORR: correct these to positive numbers"), "{wrong}: {line}");
+    }
 }
 
 /// RGBE cuts off what 8 bits do not hold: half a unit, which is much of a dark channel beside a bright one.
