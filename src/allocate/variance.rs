@@ -26,7 +26,7 @@ settings! {
     pub struct VarianceSettings {
         /// The settings of [`VarianceSettings`] that are given; the others are `None`.
         VarianceOverrides {
-            /// Luminance added before noise is compared with it; negative: noise counts by itself, in the scene's unit, from 1e-6 up to 4095.
+            /// Luminance added before noise is compared with it; negative: noise counts by itself, below 1e-6 as none, above 4095 as 4095.
             luminance_floor: f32 = 0.05, FINITE;
         }
     }

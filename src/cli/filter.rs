@@ -167,7 +167,7 @@ fn earlier_filter<'a>(args: &Args, film: &'a Film) -> Option<&'a str> {
 /// Whether no pixel of the colour is another one than before: none was filtered or cut, and none that holds no number filled in.
 fn is_as_before(args: &Args, aovs: &Aovs, colour: &Colour) -> bool {
     let is_same = |stored: Plane| (0..aovs.film.pixels()).all(|i| stored.at(i) == colour.each_ref().map(|c| c[i]));
-    asks_for_nothing(args) && aovs.get(Aov::Colour).is_some_and(is_same)
+    args.filter.is_none() && aovs.get(Aov::Colour).is_some_and(is_same)
 }
 
 /// What [`filtered`] returns where the colour stays as it is. Indirect light that was not traced for every pixel is filled in, once.
@@ -236,14 +236,15 @@ struct Clean {
 
 impl Clean {
     /// Puts the filtered colour into the file and keeps the noisy one as a layer. A single grey channel gets the mean of the
-    /// three. A colour that is as before is not called filtered, and has no noisy one beside it.
+    /// three, which rounds where they are one. A colour that is as before is not called filtered, and has no noisy one beside it.
     fn new(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Result<Self> {
         let filter = (!is_as_before(args, aovs, &colour)).then_some(args.filter.name());
         let keep_as = filter.and_then(|_| aovs.keep_as());
         let entry = (image::FILTERED, earlier_filter(args, &source.film).or(filter));
         if aovs.colour[0] == aovs.colour[1] {
             let [r, g, b] = &colour;
-            let grey: Vec<f32> = r.iter().zip(g).zip(b).map(|((r, g), b)| (r + g + b) / 3.0).collect();
+            let mean = |r: f32, g: f32, b: f32| if [r, r] == [g, b] { r } else { (r + g + b) / 3.0 };
+            let grey: Vec<f32> = r.iter().zip(g).zip(b).map(|((r, g), b)| mean(*r, *g, *b)).collect();
             colour = [0; 3].map(|_| grey.clone());
         }
         let channels: Vec<_> = aovs.colour.into_iter().zip(colour.iter().map(Vec::as_slice)).collect();

@@ -133,7 +133,7 @@ fn exposure(bytes: &[u8]) -> Result<Option<[f32; 3]>, String> {
     let header = HdrDecoder::new(reader(bytes, TEXTS)?.into_inner()).map_err(plain)?.metadata();
     let (all, (r, g, b)) = (header.exposure.unwrap_or(1.0), header.color_correction.unwrap_or((1.0, 1.0, 1.0)));
     let exposure = [r, g, b].map(|own| own * all);
-    match exposure.iter().find(|v| !(v.is_finite() && **v > 0.0)) {
+    match exposure.iter().find(|v| !(v.is_normal() && **v > 0.0)) {
         None => Ok(Some(exposure)),
         Some(wrong) => Err(format!(
             "was multiplied by {wrong}, by its lines EXPOSURE and COLORCORR: correct these to positive numbers, or remove them"

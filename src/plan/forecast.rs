@@ -21,7 +21,8 @@ pub struct Forecast {
     filter: f64,
     /// Milliseconds of a sample of every pixel.
     per_sample: f64,
-    /// Samples and errors that were measured, fewest samples first.
+    /// Samples and errors that were measured, fewest samples first. None has less error than those with more samples: where the few of
+    /// two images miss a lamp, these are alike.
     measured: Vec<[f64; 2]>,
     /// The power behind the last of them.
     power: f64,
@@ -43,11 +44,15 @@ impl Forecast {
             }
             None => USUAL_POWER,
         };
+        let mut measured: Vec<_> = levels.iter().map(|level| [f64::from(level.spp), error(level)]).collect();
+        for at in (1..measured.len()).rev() {
+            measured[at - 1][1] = measured[at - 1][1].max(measured[at][1]);
+        }
         Self {
             start: last.start_ms,
             filter: last.methods[method].ms,
             per_sample: last.samples_ms / f64::from(last.spp),
-            measured: levels.iter().map(|level| [f64::from(level.spp), error(level)]).collect(),
+            measured,
             power,
             most: most.into(),
         }
@@ -139,7 +144,7 @@ mod tests {
     /// One sample of a small lamp is off by more than any power of 64 samples tells.
     #[test]
     fn what_was_measured_is_foretold() {
-        let levels = [(1, 0.42), (4, 0.03), (16, 0.04), (64, 0.0013)];
+        let levels = [(1, 0.42), (4, 0.03), (16, 0.005), (64, 0.0013)];
         let forecast = Forecast::new(&levels.map(|(spp, error)| level(spp, error)), 0, MOST);
         levels.iter().for_each(|&(spp, error)| assert!((forecast.error_of(spp) / error - 1.0).abs() < 1e-9, "{spp}"));
         // Two samples lie between one and four by the logarithm, as sqrt(.42 * .03) = .1122 does.
@@ -148,9 +153,15 @@ mod tests {
             [0.5, 0.42, 0.1123, 0.1122, 0.0301].map(|error| forecast.samples_for(error)),
             [1, 1, 2, 3, 4].map(Some)
         );
-        // The first level that reaches it counts; behind the last, error falls as it did to there, or by the largest power.
-        assert_eq!((forecast.samples_for(0.03), forecast.power), (Some(4), POWERS[1]));
-        assert_eq!(forecast.samples_for(0.0013 / 2f64.powf(POWERS[1]) * 1.001), Some(128));
+        // Behind the last level, error falls as it did to there.
+        assert_eq!(forecast.samples_for(0.0013 / 2f64.powf(forecast.power) * 1.001), Some(128));
+    }
+
+    #[test]
+    fn no_level_is_better_than_one_with_more_samples() {
+        let forecast = Forecast::new(&[level(1, 1e-12), level(4, 0.3), level(16, 0.1)], 0, MOST);
+        assert_eq!([1, 4, 16].map(|spp| forecast.error_of(spp)), [0.3, 0.3, 0.1]);
+        assert_eq!([0.3, 0.1].map(|error| forecast.samples_for(error)), [Some(1), Some(16)]);
     }
 
     #[test]

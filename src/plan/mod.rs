@@ -4,7 +4,8 @@
 //! ```text
 //! probe: two independent images of m samples a pixel, of 4 m, of 16 m ...   error and GPU time of each, filtered and not;
 //!        where samples are placed and a time is given, the render that seems to fit as well
-//! plan:  error ~ samples^-p, time = fixed + samples * t                     the method that is cheapest, or most accurate
+//! plan:  error ~ samples^-p between levels and behind them,                 the method that is cheapest, or most accurate
+//!        time = fixed + samples * t
 //! ```
 //!
 //! [`FramePacer`] is the other planner: it keeps the frames of an engine near a time, from one frame to the next.

@@ -148,7 +148,7 @@ fn a_difference_is_found_where_it_is() {
 /// To look at all pixels for each object that differs would take minutes here.
 #[test]
 fn time_does_not_grow_as_objects_times_pixels() {
-    const EDGE: u32 = 640;
+    const EDGE: u32 = 896;
     let pixels = (EDGE * EDGE) as usize;
     let object = |i: u32| i / EDGE / 4 * (EDGE / 4) + i % EDGE / 4;
     let noise = Noise::Samples { m2: vec![[1e-5; 3]; pixels], count: vec![16.0; pixels] };

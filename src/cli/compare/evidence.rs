@@ -15,7 +15,7 @@ const NAMES: [&str; 2] = ["a", "b"];
 /// Names of all other files in it. The report goes last, since it lists what is not removed yet.
 const VIEWS: [&str; 6] = ["a.png", "b.png", "map.png", "report.html", "replay.sh", REPORT];
 const REPORT: &str = "report.json";
-/// The key of the report under which it lists the files that were written with it. No others are ever replaced or removed.
+/// The key of the report under which it lists the names of the files that were written with it. No others are ever replaced or removed.
 const WRITTEN: &str = "files";
 
 /// Checks, before the images are read, that the folder exists or can be made, and that nothing in it would be replaced but what an
@@ -31,7 +31,7 @@ pub fn check(folder: &Path, images: [&Path; 2]) -> Result<()> {
     if let Some(path) = files(folder, images).iter().find(is_foreign) {
         let [folder, path, list] = [folder, path, &report].map(Path::display);
         return Err(Error::Usage(format!(
-            "--evidence {folder} would replace {path}, which no earlier comparison has listed in {list}: choose another folder"
+            "--evidence {folder} would replace {path}, which no earlier comparison has listed in {list}: remove it, or choose another folder"
         )));
     }
     output::check(&report)
@@ -61,7 +61,7 @@ fn earlier(folder: &Path, images: [&Path; 2]) -> impl Iterator<Item = PathBuf> {
 
 /// What an earlier comparison wrote, by its report. Links are the user's, and so is all that [`write`] gives no such name.
 fn written(folder: &Path) -> Vec<PathBuf> {
-    let report = std::fs::read(folder.join(REPORT)).ok();
+    let report = Some(folder.join(REPORT)).filter(|path| path.is_file()).and_then(|path| std::fs::read(path).ok());
     let told = report.and_then(|text| serde_json::from_slice::<Value>(&text).ok()).unwrap_or_default();
     let names = told[WRITTEN].as_array().into_iter().flatten().filter_map(Value::as_str);
     let is_copy = |name: &str| {

@@ -46,7 +46,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", requires = "statistical")]
     junit: Option<PathBuf>,
     /// Unless the images are the same, write them, the map, the page, all figures and commands that render the worst pixels
-    /// again to this folder; what an earlier comparison left there goes once they are, and no other file is replaced or removed
+    /// again to this folder; what an earlier comparison left there, as its report.json lists, goes once they are
     #[arg(long, value_name = "FOLDER", requires = "statistical")]
     evidence: Option<PathBuf>,
 }
