@@ -8,10 +8,12 @@
 layout(local_size_x_id = 100) in;
 #include "shared/packed_pixels.glsl"
 layout(binding = 2) uniform samplerBuffer variance; // of vec3
-layout(scalar, binding = 3) writeonly buffer Estimates { vec4 estimate[]; };
+layout(binding = 3) uniform usamplerBuffer guide; // of Guide
+layout(scalar, binding = 4) writeonly buffer Estimates { vec4 estimate[]; };
 layout(scalar, push_constant) uniform Push { SurfacesPush push; };
 
 #include "shared/own_variance.glsl"
+#include "shared/blurred.glsl"
 
 layout(constant_id = 115) const bool CAUTIOUS = true;
 const int REACH = 3;
@@ -19,12 +21,29 @@ const int REACH = 3;
 // like pixels have on average to be worth PRIOR further samples (the moderated variance of Smyth 2004, with a prior that is chosen).
 // Without it `auto` had 1.2 times the error in a room that is lit through a gap, at 16 samples.
 const float PRIOR = 8.0;
+// The variance of a difference over its square from which on two pixels may show the same, and that up to which they do not. One sample
+// of many that brings all light makes it 1, two make it about 1/2. Without this the image of a sun in a ball made its surroundings
+// doubtful, so that fog around it was left to noise. Neither do equal pixels count that tell no variance: all their samples may be dark by chance.
+const float SAME = 0.5;
+const float OTHER = 0.375;
 
-// The means over like pixels of what their samples say of their variance.
-float[ROWS] told_around(ivec2 first, Pixel p[ROWS]) {
+// How much a neighbour that is so far apart, with such a variance of the difference, tells of a pixel's variance.
+float tells(float variance, float apart) {
+    float square = apart * apart;
+    if (variance >= SAME * square) return variance > 0.0 ? 1.0 : 0.0;
+    return max((variance / square - OTHER) / (SAME - OTHER), 0.0);
+}
+
+// The means over like pixels of what their samples say of their variance. Where a lens blurs, all of them count in full: lamps out of focus
+// are dark beside for sure.
+float[ROWS] told_around(ivec2 first, Pixel p[ROWS], float own[ROWS]) {
     ivec2 size = ivec2(push.size);
     float total[ROWS], sum[ROWS];
-    [[unroll]] for (int k = 0; k < ROWS; k++) total[k] = sum[k] = 0.0;
+    bool all[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        total[k] = sum[k] = 0.0;
+        all[k] = blurred(min(first.y + k, size.y - 1) * size.x + first.x);
+    }
     // Tested at its end: see shared/traverse.glsl.
     int i = -REACH;
     do {
@@ -37,13 +56,14 @@ float[ROWS] told_around(ivec2 first, Pixel p[ROWS]) {
             [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
                 if (abs(j - k) <= REACH) {
                     float w = counts ? edge_weight(q, edge_exponent(p[k], q, push.rates)) : 0.0;
+                    if (!all[k]) w *= tells(max(own[k], 0.0) + of_tap, contrast(q.colour.rgb, p[k].colour.rgb));
                     total[k] += w;
                     sum[k] += w > 0.0 ? w * of_tap : 0.0;
                 }
             }
         }
     } while (++i <= REACH);
-    [[unroll]] for (int k = 0; k < ROWS; k++) sum[k] /= total[k];
+    [[unroll]] for (int k = 0; k < ROWS; k++) sum[k] = total[k] > 0.0 ? sum[k] / total[k] : 0.0;
     return sum;
 }
 
@@ -96,7 +116,7 @@ void main() {
         unsure = unsure || own[k] >= 0.0;
     }
     if (untold) found = spread(ivec2(x, first), p);
-    if (CAUTIOUS && unsure) around = told_around(ivec2(x, first), p);
+    if (CAUTIOUS && unsure) around = told_around(ivec2(x, first), p, own);
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         float count = p[k].colour.w, v = own[k] >= 0.0 ? own[k] : found[k];
         float freedom = count - 1.0;

@@ -5,9 +5,9 @@ use super::pack::{Pack, Packed};
 use super::{FilterInput, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{SurfacesPush, vec3, vec4};
+use crate::layout::{Guide, NONE, SurfacesPush, vec3, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::noise_estimate::{self, Bind, Constants, PRIOR};
+use crate::shaders::noise_estimate::{self, Bind, Constants, OTHER, PRIOR, SAME};
 pub use crate::shaders::shared::luminance::ENOUGH;
 use crate::shaders::shared::luminance::STRONGEST;
 use crate::shaders::shared::own_variance;
@@ -51,7 +51,7 @@ impl Estimate {
         let rates = self.rates.as_array();
         let push = SurfacesPush { size: planes.size, rates, ..Default::default() };
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
-        let bind = Bind { packed_pixels: pack.bind(), variance, estimate: &self.plane };
+        let bind = Bind { packed_pixels: pack.bind(), variance, guide: &planes.guide, estimate: &self.plane };
         let kernel = &self.kernels[usize::from(planes.variance.is_some())];
         rec.dispatch(kernel, bind, &push, kernel.groups(threads(planes.size, 1)))
     }
@@ -85,15 +85,32 @@ pub fn own_variance(input: &FilterInput, at: usize, count: f32) -> Option<f32> {
     measured.then(|| luminance(v.map(f32::sqrt)).min(STRONGEST).powi(2))
 }
 
-/// The mean of that over like pixels.
+/// The mean of that over like pixels, as the kernel's.
 fn told_around(input: &FilterInput, image: &[Packed], own: &[Option<f32>], at: usize, rates: &Rates) -> f32 {
+    let (all, of_pixel) = (blurred(&input.guide[at]), own[at].unwrap_or(0.0));
     let (mut total, mut sum) = (0.0, 0.0);
     for (q, variance) in window(input, at).filter_map(|q| Some((&image[q], own[q]?))) {
-        let w = edge_weight(q, rates.exponent(&image[at], q));
+        let tells = if all { 1.0 } else { tells(of_pixel + variance, contrast(q.colour, image[at].colour)) };
+        let w = tells * edge_weight(q, rates.exponent(&image[at], q));
         total += w;
         sum += if w > 0.0 { w * variance } else { 0.0 };
     }
-    sum / total
+    if total > 0.0 { sum / total } else { 0.0 }
+}
+
+/// How much a neighbour that is `apart`, with such a variance of the difference, tells of a pixel's variance.
+fn tells(variance: f32, apart: f32) -> f32 {
+    let square = apart * apart;
+    match variance >= SAME * square {
+        true if variance > 0.0 => 1.0,
+        true => 0.0,
+        false => ((variance / square - OTHER) / (SAME - OTHER)).max(0.0),
+    }
+}
+
+/// Whether a lens blurs what the pixel shows, or nothing was hit, as in `glsl/shared/blurred.glsl`.
+pub fn blurred(guide: &Guide) -> bool {
+    guide.material == NONE
 }
 
 /// The pixels around one, and itself.

@@ -1,9 +1,9 @@
 //! What `auto` gives back of what its blend has lost: the twin of `glsl/auto/auto_residual.comp`.
 use crate::denoise::filter::FilterInput;
 use crate::denoise::filter::edge::{Rates, edge_weight};
-use crate::denoise::filter::noise_estimate::{contrast, own_variance};
+use crate::denoise::filter::noise_estimate::{blurred, contrast, own_variance};
 use crate::denoise::filter::pack::Packed;
-use crate::layout::{Guide, NONE, vec4};
+use crate::layout::vec4;
 use crate::shaders::auto::ENOUGH_TO_DOUBT;
 use crate::shaders::auto_residual::{self, ENOUGH_PIXELS, ENOUGH_SAMPLES, NARROW, PRIOR_SAMPLES, SIGNIFICANT};
 use glam::{Vec3, Vec4, Vec4Swizzles};
@@ -33,11 +33,6 @@ pub fn given_back(
     let restored =
         |i: usize| -> vec4 { restored(image, &residuals, size, i, surfaces, prior(i)).extend(blend[i].w).into() };
     (0..image.len()).map(restored).collect()
-}
-
-/// Whether a lens blurs what the pixel shows, or nothing was hit, as in `glsl/shared/blurred.glsl`.
-fn blurred(guide: &Guide) -> bool {
-    guide.material == NONE
 }
 
 /// Sums over the like pixels of a window.
