@@ -23,7 +23,8 @@ const int REACH = 3;
 const float PRIOR = 8.0;
 // The variance of a difference over its square from which on two pixels may show the same, and that up to which they do not. One sample
 // of many that brings all light makes it 1, two make it about 1/2. Without this the image of a sun in a ball made its surroundings
-// doubtful, so that fog around it was left to noise. Neither do equal pixels count that tell no variance: all their samples may be dark by chance.
+// doubtful, so that fog around it was left to noise. Neither do equal pixels count that tell no variance: all their samples may be
+// dark by chance.
 const float SAME = 0.5;
 const float OTHER = 0.375;
 
@@ -34,15 +35,15 @@ float tells(float variance, float apart) {
     return max((variance / square - OTHER) / (SAME - OTHER), 0.0);
 }
 
-// The means over like pixels of what their samples say of their variance. Where a lens blurs, all of them count in full: lamps out of focus
-// are dark beside for sure.
+// The means over like pixels of what their samples say of their variance. Where a lens blurs, all of them count in full: pixels beside
+// lamps out of focus may be dark by chance as well.
 float[ROWS] told_around(ivec2 first, Pixel p[ROWS], float own[ROWS]) {
     ivec2 size = ivec2(push.size);
     float total[ROWS], sum[ROWS];
-    bool all[ROWS];
+    bool blurs[ROWS];
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         total[k] = sum[k] = 0.0;
-        all[k] = blurred(min(first.y + k, size.y - 1) * size.x + first.x);
+        blurs[k] = blurred(min(first.y + k, size.y - 1) * size.x + first.x);
     }
     // Tested at its end: see shared/traverse.glsl.
     int i = -REACH;
@@ -56,7 +57,7 @@ float[ROWS] told_around(ivec2 first, Pixel p[ROWS], float own[ROWS]) {
             [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
                 if (abs(j - k) <= REACH) {
                     float w = counts ? edge_weight(q, edge_exponent(p[k], q, push.rates)) : 0.0;
-                    if (!all[k]) w *= tells(max(own[k], 0.0) + of_tap, contrast(q.colour.rgb, p[k].colour.rgb));
+                    if (!blurs[k]) w *= tells(max(own[k], 0.0) + of_tap, contrast(q.colour.rgb, p[k].colour.rgb));
                     total[k] += w;
                     sum[k] += w > 0.0 ? w * of_tap : 0.0;
                 }

@@ -2,6 +2,7 @@
 // light; both leave the surface. Radiance is transported: refraction scales it by 1 / eta^2.
 // Needs effects.glsl and the binding `texels`, which holds the tables of rough coats and metallic microfacets.
 #include "shared/warp.glsl"
+#include "shared/largest_channel.glsl"
 #include "shared/fresnel.glsl"
 #include "shared/microfacet.glsl"
 #include "shared/metallic.glsl"

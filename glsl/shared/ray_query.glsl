@@ -31,7 +31,8 @@ bool triangle_stops(uvec2 surface, uint mask_seed, uvec2 from) {
     return !FX_ALPHA_MASKS || mask_blocks(surface.x, surface.y, barycentric, direction, mask_seed);
 }
 
-// Tests the sphere in the box that the ray meets, which is none where a triangle lies between spheres; `normal` is that of the nearest sphere so far.
+// Tests the sphere in the box that the ray meets, which is none where a triangle lies between spheres; `normal` is that of the
+// nearest sphere so far.
 void decide_sphere(uvec2 surface, Segment ray, uvec2 from, inout vec2 normal) {
     if (!is_sphere(surface.x)) return;
     RaySpace space = ray_space(rayQueryGetIntersectionObjectRayOriginEXT(query, false),

@@ -236,7 +236,7 @@ struct Clean {
 
 impl Clean {
     /// Puts the filtered colour into the file and keeps the noisy one as a layer. A single grey channel gets the mean of the
-    /// three, which rounds where they are one. A colour that is as before is not called filtered, and has no noisy one beside it.
+    /// three, or what they are where they are equal, since a mean rounds. A colour that is as before is not called filtered, and has no noisy one beside it.
     fn new(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Result<Self> {
         let filter = (!is_as_before(args, aovs, &colour)).then_some(args.filter.name());
         let keep_as = filter.and_then(|_| aovs.keep_as());

@@ -263,15 +263,20 @@ fn png_holds_srgb_code_values() {
     assert_eq!(codes(f32::INFINITY, &aces), 255);
 }
 
+/// Writes 18 pixels, and returns the file's bytes.
+fn hdr(path: &Path) -> Vec<u8> {
+    let mut film = Film::new(9, 2);
+    film.add_vec3("", ["R", "G", "B"], &std::array::from_fn::<_, 18, _>(|i| [i as f32, 0.25, 2.0]));
+    image::write(path, &film, &WriteOptions::default()).unwrap();
+    std::fs::read(path).unwrap()
+}
+
 /// Radiance's own files begin otherwise than those that Mitsuba writes.
 #[test]
 fn both_signatures_of_hdr_are_read_alike() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.hdr");
-    let mut film = Film::new(9, 2);
-    film.add_vec3("", ["R", "G", "B"], &std::array::from_fn::<_, 18, _>(|i| [i as f32, 0.25, 2.0]));
-    image::write(&path, &film, &WriteOptions::default()).unwrap();
-    let bytes = std::fs::read(&path).unwrap();
+    let bytes = hdr(&path);
     let other = [b"#?RGBE\n", bytes.strip_prefix(b"#?RADIANCE\n").unwrap()].concat();
     let [a, b] = [&bytes, &other].map(|bytes| image::decode(bytes).unwrap().picture(None).unwrap().pixels);
     assert!(a == b && a[17][0] > 16.0, "{a:?} {b:?}");
@@ -284,10 +289,7 @@ fn both_signatures_of_hdr_are_read_alike() {
 fn hdr_is_divided_by_the_exposures_of_its_header() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.hdr");
-    let mut film = Film::new(9, 2);
-    film.add_vec3("", ["R", "G", "B"], &std::array::from_fn::<_, 18, _>(|i| [i as f32, 0.25, 2.0]));
-    image::write(&path, &film, &WriteOptions::default()).unwrap();
-    let bytes = std::fs::read(&path).unwrap();
+    let bytes = hdr(&path);
     let decoded = |signature: &str, lines: &str| {
         let rest = bytes.strip_prefix(b"#?RADIANCE\n").unwrap();
         image::decode(&[signature.as_bytes(), lines.as_bytes(), rest].concat())

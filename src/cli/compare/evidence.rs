@@ -41,7 +41,8 @@ pub fn check(folder: &Path, images: [&Path; 2]) -> Result<()> {
 /// itself is not among them: it stays as it is.
 pub fn touched(folder: &Path, images: [&Path; 2]) -> Vec<PathBuf> {
     let mut all = files(folder, images);
-    all.extend(earlier(folder, images).filter(|path| !files(folder, images).contains(path)));
+    let more: Vec<_> = earlier(folder, images).filter(|path| !all.contains(path)).collect();
+    all.extend(more);
     all
 }
 

@@ -87,10 +87,10 @@ pub fn own_variance(input: &FilterInput, at: usize, count: f32) -> Option<f32> {
 
 /// The mean of that over like pixels, as the kernel's.
 fn told_around(input: &FilterInput, image: &[Packed], own: &[Option<f32>], at: usize, rates: &Rates) -> f32 {
-    let (all, of_pixel) = (blurred(&input.guide[at]), own[at].unwrap_or(0.0));
+    let (blurs, of_pixel) = (blurred(&input.guide[at]), own[at].unwrap_or(0.0));
     let (mut total, mut sum) = (0.0, 0.0);
     for (q, variance) in window(input, at).filter_map(|q| Some((&image[q], own[q]?))) {
-        let tells = if all { 1.0 } else { tells(of_pixel + variance, contrast(q.colour, image[at].colour)) };
+        let tells = if blurs { 1.0 } else { tells(of_pixel + variance, contrast(q.colour, image[at].colour)) };
         let w = tells * edge_weight(q, rates.exponent(&image[at], q));
         total += w;
         sum += if w > 0.0 { w * variance } else { 0.0 };
