@@ -412,6 +412,11 @@ fn options_that_cannot_be_are_one_line() {
         ("--frames 0..3 --preview a.png", "a preview goes to a .gif"),
         ("--only 99999", "none of the frames"),
         ("--frames 0..3 --reproject forward --max-spp 9", "set neither noise_threshold nor max_spp"),
+        (
+            "--frames 0..11 -o p.#.png --heatmap p.##.png",
+            "--heatmap p.10.png is the same file as -o: choose another name",
+        ),
+        ("--frames 0..11 -o p#.png -o p1#.hdr -o ./p1#.png", "-o p10.png is the same file as -o of another frame"),
         ("--frames 0..3 --reproject-error -1", "reproject-error is -1: choose 0 or more"),
     ] {
         let output = run(&folder, words);

@@ -6,11 +6,11 @@ mod stage;
 mod survey;
 
 use super::common::{frames_per_second, with_ranges};
-use super::files::{check_not_of_scene, scene_name};
+use super::files::{check_not_of_scene, key, scene_name};
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
 use crate::error::{Error, Result};
-use crate::image;
+use crate::image::{self, output::is_special};
 use crate::render::{Carriage, Reproject, ReprojectOverrides};
 use crate::scene::Scene;
 use crate::scene::description::numbered;
@@ -19,6 +19,7 @@ use clap::{Arg, Id};
 use preview::Preview;
 use serde::Serialize;
 use stage::Stage;
+use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -167,11 +168,31 @@ impl Args {
     /// What is written, once the scene is loaded.
     fn check_with(&self, frames: &Range<u32>, scene: &Scene) -> Result<()> {
         let mut files: Vec<_> = self.preview.iter().map(|path| ("--preview", path.clone())).collect();
+        let mut frame_of = vec![None; files.len()];
         for number in self.numbers(frames)? {
             files.extend(outputs::all(&self.of_frame(number)?));
+            frame_of.resize(files.len(), Some(number));
         }
+        check_apart(&files, &frame_of)?;
         check_not_of_scene(&files, scene)
     }
+}
+
+/// Checks that no two files of a sequence, each with the number of its frame, are one: `a.#.png` and `a.##.png` are from frame 10 on.
+///
+/// # Errors
+/// [`Error::Usage`].
+fn check_apart(files: &[(&str, PathBuf)], frame_of: &[Option<u32>]) -> Result<()> {
+    let mut taken = HashMap::with_capacity(files.len());
+    let files = files.iter().zip(frame_of).filter(|((_, path), _)| !is_special(path));
+    for ((option, path), frame) in files {
+        if let Some((other, other_frame)) = taken.insert(key(path), (option, frame)) {
+            let of = if frame == other_frame { "" } else { " of another frame" };
+            let path = path.display();
+            return Err(Error::Usage(format!("{option} {path} is the same file as {other}{of}: choose another name")));
+        }
+    }
+    Ok(())
 }
 
 /// A name like this one with a place for the number of the frame: that of a `%04d`, or before the extension.
