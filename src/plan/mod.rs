@@ -44,6 +44,19 @@ pub enum Target {
     RelMse(f64),
 }
 
+impl Target {
+    fn check(self) -> Result<()> {
+        let (value, article, name) = match self {
+            Self::GpuMs(ms) => (ms, "a", "time"),
+            Self::RelMse(error) => (error, "an", "error"),
+        };
+        match value.is_finite() && value > 0.0 {
+            true => Ok(()),
+            false => Err(Error::Usage(format!("{article} {name} of {value}: give a finite number above 0"))),
+        }
+    }
+}
+
 /// A method, the samples that it would take, and what is expected of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
@@ -149,13 +162,7 @@ fn by_cost(target: Target, mut considered: Vec<Expected>) -> Vec<Expected> {
 }
 
 fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> {
-    let (value, article, name) = match target {
-        Target::GpuMs(ms) => (ms, "a", "time"),
-        Target::RelMse(error) => (error, "an", "error"),
-    };
-    if !(value.is_finite() && value > 0.0) {
-        return Err(Error::Usage(format!("{article} {name} of {value}: give a finite number above 0")));
-    }
+    target.check()?;
     if settings.allocate.noise_threshold > 0.0 {
         let what = "a noise threshold ends a render by itself: give it, or a time or an error";
         return Err(Error::Usage(what.to_owned()));
@@ -211,7 +218,7 @@ impl Plan {
     /// Reads the text of a plan's file.
     ///
     /// # Errors
-    /// [`Error::Usage`] with one line for what is no plan, and for one of another version.
+    /// [`Error::Usage`] with one line for what is no plan, for one of another version, and for one whose settings are not what was chosen.
     pub fn parse(text: &str) -> Result<Self> {
         #[derive(Deserialize)]
         struct Header {
@@ -223,8 +230,15 @@ impl Plan {
             return Err(Error::Usage(format!("is a plan of version {version}, this program knows version {VERSION}")));
         }
         let plan: Self = serde_json::from_str(text).map_err(no_plan)?;
+        plan.target.check()?;
         plan.settings.validate()?;
         plan.method()?;
+        let (chosen, settings) = (plan.chosen.spp, plan.settings.spp);
+        if chosen != settings {
+            // The settings are rendered, and what was chosen is told and judged.
+            let what = "set both alike, or plan anew";
+            return Err(Error::Usage(format!("has {chosen} as spp of chosen, but {settings} of settings: {what}")));
+        }
         Ok(plan)
     }
 

@@ -111,5 +111,15 @@ fn what_cannot_be_planned_is_told_in_one_line() {
     let glass = Path::new(SCENE).with_file_name("glass.toml");
     complains(&render(&folder, glass.to_str().unwrap(), "--plan plan.json -o b.exr"), 2, &["another scene"]);
     complains(&render(&folder, SCENE, "--plan plan.json --seed 9 -o b.exr"), 2, &["leave out options"]);
+    // Edited by hand, it would render something else than it says.
+    let plan: Value = serde_json::from_slice(&std::fs::read(folder.path().join("plan.json")).unwrap()).unwrap();
+    let mut edited = plan.clone();
+    edited["chosen"]["spp"] = (plan["settings"]["spp"].as_u64().unwrap() + 1).into();
+    write("edited.json", &edited.to_string());
+    complains(&render(&folder, SCENE, "--plan edited.json -o b.exr"), 3, &["edited.json", "chosen", "settings"]);
+    let mut edited = plan;
+    edited["target"] = serde_json::json!({ "gpu_ms": -1.0 });
+    write("edited.json", &edited.to_string());
+    complains(&render(&folder, SCENE, "--plan edited.json -o b.exr"), 3, &["edited.json", "a time of -1"]);
     assert!(!folder.path().join("b.exr").exists());
 }
