@@ -12,6 +12,7 @@ use super::common::{Common, PngOptions};
 use super::files::Files;
 use super::overrides::Overrides;
 use super::{Exit, complain};
+use crate::allocate::Placing;
 use crate::denoise;
 use crate::denoise::filter::{self, Method};
 use crate::error::{Error, Result};
@@ -158,6 +159,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
     };
     let (args, settings) = &planned::applied(args, settings, plan.as_ref())?;
+    warn_of_unplaced(args, settings);
     if let Some(method) = args.denoise {
         method.check()?;
     }
@@ -252,6 +254,23 @@ pub fn warn_of_unread(args: &Args, settings: &Settings) {
         return;
     }
     args.common.warn_of_unread(&args.overrides.allocate.given(), policy.name, |option| policy.reads(option));
+}
+
+/// Tells where other settings leave a policy no samples to place. Where samples are carried from frame to frame they count, too.
+pub fn warn_of_unplaced(args: &Args, settings: &Settings) {
+    let Allocate { policy, min_spp, max_spp, noise_threshold, .. } = settings.allocate.clone();
+    let (spp, name) = (settings.spp, policy.name);
+    if noise_threshold > 0.0 || settings.allocate.is_even() {
+        return;
+    }
+    let told = if min_spp >= spp {
+        format!("min-spp is {min_spp}: spp, {spp}, leaves no samples that {name} could place")
+    } else if policy.placing != Placing::Chosen && (1..=spp).contains(&max_spp) {
+        format!("max-spp is {max_spp}, and spp {spp}: all pixels get {max_spp}, and {name} places none")
+    } else {
+        return;
+    };
+    args.common.warn(&[told]);
 }
 
 /// Of light that is not traced for every pixel a picture can be made by some filters alone.

@@ -50,9 +50,22 @@ fn options_that_change_nothing_are_told() {
         assert!(output.status.success(), "{output:?}");
         String::from_utf8(output.stderr).unwrap()
     };
-    let small = format!("render {BOX} --width 8 --height 8 --spp 2 -o a.exr");
+    let small = format!("render {BOX} --width 8 --height 8 --spp 4 -o a.exr");
     assert_eq!(warned(&format!("{small} --window 3")), "warning: --window changes nothing: uniform does not read it\n");
     assert_eq!(warned(&format!("{small} --window 3 --allocate both")), "");
+    let told = "warning: min-spp is 4: spp, 4, leaves no samples that both could place\n";
+    assert_eq!(warned(&format!("{small} --allocate both --min-spp 4")), told);
+    assert_eq!(warned(&format!("{small} --allocate both --min-spp 4 --noise-threshold 1")), "", "there spp is a limit");
+    let told =
+        |most: u32| format!("warning: max-spp is {most}, and spp 4: all pixels get {most}, and both places none\n");
+    assert_eq!(warned(&format!("{small} --allocate both --max-spp 3")), told(3));
+    assert_eq!(warned(&format!("{small} --allocate both --max-spp 4")), told(4));
+    assert_eq!(warned(&format!("{small} --allocate both --max-spp 5")), "");
+    assert_eq!(warned(&format!("{small} --allocate threshold --max-spp 3")), "", "there max-spp is no limit");
+    let moving = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/moving/scene.toml");
+    let frames = format!("sequence {moving} --width 8 --height 8 --frames 0..1 --spp 2 --allocate both -o f.#.exr");
+    assert!(!warned(&frames).contains("min-spp"), "carried samples count");
+    assert!(warned(&format!("{frames} --reproject off")).contains("warning: min-spp is 2"));
     let filter = "filter a.exr -o b.exr --filter";
     let told = "warning: --levels changes nothing: bilateral does not read it\n";
     assert_eq!(warned(&format!("{filter} bilateral --levels 3 --radius 4")), told);

@@ -85,6 +85,9 @@ impl<'a> Stage<'a> {
         let own_seeds = args.seed_per_frame || reproject.is_some() || slides(args, &survey);
         let moves = Moves::of(&animation);
         render::warn_of_unread(&args.render, &settings);
+        if reproject.is_none() {
+            render::warn_of_unplaced(&args.render, &settings);
+        }
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
         Ok(Self {
             args,
