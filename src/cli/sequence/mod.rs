@@ -220,7 +220,8 @@ pub struct FrameReport {
     pub error: Option<String>,
     /// Wall time of all that was done for it.
     pub seconds: f64,
-    /// Wall time of moving the scene: hierarchies, lights, what is uploaded.
+    /// Wall time of moving the scene: hierarchies, lights, what is uploaded. In a frame that makes a renderer, as the first does, that of
+    /// compiling it is part of it.
     pub pose_seconds: f64,
     /// What rays pay in the worst of the refitted hierarchies over when that was built; none when nothing is deformed.
     pub refit_cost: Option<f32>,
