@@ -29,7 +29,7 @@ pub fn read(path: &Path, channels: [&str; 3]) -> anyhow::Result<Picture> {
     let [Some(r), Some(g), Some(b)] = planes else {
         anyhow::bail!("{}: the channels {} are not all there", path.display(), channels.join(", "));
     };
-    let picture = Picture::of_planes([film.width, film.height], &[r, g, b]);
+    let picture = Picture::of_planes(film.size(), &[r, g, b]);
     picture.finite().map_err(|what| anyhow!("{}: {what}", path.display()))
 }
 
@@ -96,7 +96,7 @@ fn structure(image: &Picture, reference: &Picture) -> f64 {
 /// Calls `of_pixel` for every pixel and groups the results by square blocks. There are about 32 blocks along the shorter
 /// side, of at least 16 pixels each except at the right and lower edges.
 pub fn blocks<T>(picture: &Picture, of_pixel: impl Fn(usize) -> T) -> Vec<Vec<T>> {
-    let [width, height] = [picture.width, picture.height].map(|n| n as usize);
+    let [width, height] = picture.size().map(|n| n as usize);
     let edge = (width.min(height) / 32).clamp(4, 32);
     let columns = width.div_ceil(edge);
     let mut blocks: Vec<_> = (0..columns * height.div_ceil(edge)).map(|_| Vec::new()).collect();

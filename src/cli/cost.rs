@@ -40,9 +40,9 @@ pub fn run(args: &Args) -> Result<Exit> {
 
 fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> Result<Plan> {
     let Points { motion, base, candidates, .. } = points;
-    let [width, height] = [base.width, base.height];
+    let size = base.size();
     let seeds = seeds_of(base.seed, args.repeats, motion.is_some());
-    let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base, &seeds)));
+    let given = |file: &Path| reference::read(file, size, Some((scene, &base, &seeds)));
     let reference = args.reference.as_deref().map(given).transpose()?;
     let settings = args.choices.open(path)?.settings()?;
     let judged = motion.as_ref().map(|motion| motion.judged);
@@ -50,7 +50,7 @@ fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> R
     let (ray_queries, device) = (gpu.traces_by_ray_query(), args.common.device_words());
     let command = |candidate| points::command(&scene_words, judged, &settings, candidate, ray_queries, &device);
     Ok(Plan {
-        scene: scene_info(path, [width, height], judged),
+        scene: scene_info(path, size, judged),
         commands: candidates.iter().map(command).collect(),
         motion,
         base,

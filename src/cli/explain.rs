@@ -239,8 +239,7 @@ fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<Sizes> 
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let size = |settings: &Settings| [settings.width, settings.height];
-    Ok(Sizes { timed_size: size(&scene.settings), film_size: size(&whole) })
+    Ok(Sizes { timed_size: scene.settings.size(), film_size: whole.size() })
 }
 
 /// Bytes that buffers of the render take more, of a film of `whole` pixels, where films of `timed` pixels were measured.

@@ -236,7 +236,7 @@ fn renderer(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings) -> Resul
 /// # Errors
 /// [`Error::Device`].
 pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Result<()> {
-    let (size, unified) = ([settings.width, settings.height], gpu.info().unified);
+    let (size, unified) = (settings.size(), gpu.info().unified);
     let while_filtered = denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
     let bytes = film::host_bytes(settings, unified).max(while_filtered);
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);

@@ -44,7 +44,7 @@ impl Converging {
             allocate: Allocate::default(),
             ..settings.clone()
         };
-        let size = [part.width, part.height];
+        let size = part.size();
         let file = folder
             .map(|folder| folder.join(format!("{}.exr", key(scene, &part))))
             .filter(|_| scene.fingerprint(size).is_ok());
@@ -162,7 +162,7 @@ impl Converging {
 /// Everything that the image depends on.
 fn key(scene: &Scene, settings: &Settings) -> String {
     let mut key = Fingerprint::default();
-    let scene = scene.fingerprint([settings.width, settings.height]).map(|f| f.to_string()).unwrap_or_default();
+    let scene = scene.fingerprint(settings.size()).map(|f| f.to_string()).unwrap_or_default();
     let settings = serde_json::to_string(settings).unwrap_or_default();
     key.add(scene.as_bytes());
     key.add(settings.as_bytes());

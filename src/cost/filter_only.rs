@@ -61,7 +61,7 @@ pub fn key(gpu: &Gpu, plan: &FilterPlan) -> String {
     let mut key = Fingerprint::default();
     let settings = |candidate: &FilterCandidate| (method(candidate), values(&candidate.settings.entries()));
     let candidates: Vec<_> = plan.candidates.iter().map(settings).collect();
-    let size = [plan.film.width, plan.film.height];
+    let size = plan.film.size();
     let parts = [
         text(&(size, &plan.film.metadata)),
         text(&candidates),
@@ -155,7 +155,7 @@ impl Filters<'_> {
             errors: Default::default(),
         };
         let warm_up = add_filter(&mut run, &WarmUp { compile_ms: 0.0, first_run_ms: 0.0 }, &filtered);
-        let size = [self.plan.film.width, self.plan.film.height];
+        let size = self.plan.film.size();
         let picture = self.plan.film.as_rec709(Picture::of_planes(size, &filtered.colour));
         let picture = picture.finite().map_err(Error::Device)?;
         Ok(Measured { point, run, picture, warm_up, device_bytes: filtered.device_bytes })

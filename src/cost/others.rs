@@ -103,7 +103,7 @@ pub fn judged(runs: &[OtherRun], reference: &Reference) -> Vec<(Point, Option<Pi
 
 fn one(run: &OtherRun, reference: &Reference) -> Result<(Run, Picture)> {
     let picture = image::read(&run.image)?.rec709(None).map_err(|what| Error::input(&run.image, what))?;
-    let [size, wanted] = [&picture, &reference.picture].map(|picture| [picture.width, picture.height]);
+    let [size, wanted] = [picture.size(), reference.picture.size()];
     if size != wanted {
         let what = format!("is {}x{}, but {}x{} is measured", size[0], size[1], wanted[0], wanted[1]);
         return Err(Error::input(&run.image, what));

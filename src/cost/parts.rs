@@ -78,7 +78,7 @@ impl Parts {
         let film = image::read(file).ok()?;
         let count: u32 = film.metadata.get(PARTS)?.parse().ok()?;
         let (mean, variance) = (film.picture(None).ok()?, film.picture(Some("variance")).ok()?);
-        if [film.width, film.height] != size || mean.non_finite() + variance.non_finite() > 0 {
+        if film.size() != size || mean.non_finite() + variance.non_finite() > 0 {
             return None;
         }
         let n = f64::from(count);

@@ -57,7 +57,7 @@ pub struct Watch<'a> {
 /// Identifies what is measured, where and how.
 pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
     let mut key = Fingerprint::default();
-    let scene = scene.fingerprint([plan.base.width, plan.base.height]).map(|f| f.to_string()).unwrap_or_default();
+    let scene = scene.fingerprint(plan.base.size()).map(|f| f.to_string()).unwrap_or_default();
     let methods: Vec<&Method> = plan.candidates.iter().map(|candidate| &candidate.method).collect();
     let filters: Vec<_> =
         plan.candidates.iter().map(|candidate| values(&candidate.filter_settings.entries())).collect();

@@ -29,7 +29,7 @@ pub struct Reference {
 pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings, &[u32])>) -> Result<Reference> {
     let film = image::read(path)?;
     let wrong = |what: String| Error::input(path, what);
-    if [film.width, film.height] != size {
+    if film.size() != size {
         let what = format!(
             "is {}x{}, but {}x{} is measured: take a reference of that size",
             film.width, film.height, size[0], size[1]

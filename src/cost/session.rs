@@ -201,7 +201,7 @@ impl<'a> Session<'a> {
         let filtered = timed(self.gpu, Noisy::of_film(renderer)?, &recipe)?;
         let warm_up = add_filter(&mut run, costs, &filtered);
         let device_bytes = device_bytes + filtered.device_bytes;
-        let size = [renderer.settings().width, renderer.settings().height];
+        let size = renderer.settings().size();
         let picture = Picture::of_planes(size, &filtered.colour).finite().map_err(Error::Device)?;
         Ok(Measured { point, run, picture, warm_up, device_bytes })
     }

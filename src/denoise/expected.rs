@@ -80,7 +80,7 @@ pub fn reference(parts: &Parts, filtered: &[vec4], expected: &[vec3]) -> Option<
 }
 
 fn noise_of_sharp(parts: &Parts, i: usize, of_samples: f32) -> f32 {
-    let [width, height] = [parts.input.width, parts.input.height].map(i64::from);
+    let [width, height] = parts.input.size().map(i64::from);
     let factor = Vec3::from(parts.factor[i]);
     let sharp = |i: usize| {
         let (sharp, factor) = (Vec3::from(parts.sharp[i]), Vec3::from(parts.factor[i]));

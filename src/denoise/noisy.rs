@@ -101,7 +101,7 @@ impl Noisy {
             return Err(Error::Usage(format!("a frame cannot be filtered without {what}")));
         }
         Ok(Self {
-            size: [settings.width, settings.height],
+            size: settings.size(),
             stats: tiles[0].stats.clone(),
             light: tiles[0].light.clone(),
             blur: tiles[0].blur.clone(),

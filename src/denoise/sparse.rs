@@ -82,7 +82,7 @@ impl Sparse {
 
 /// Twin of `decimate.comp`.
 pub fn decimated(whole: &FilterInput, stride: u32) -> FilterInput {
-    let [width, height] = traced_size([whole.width, whole.height], stride);
+    let [width, height] = traced_size(whole.size(), stride);
     let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| [x, y]));
     let at = |[x, y]: [u32; 2]| (y * stride * whole.width + x * stride) as usize;
     FilterInput {

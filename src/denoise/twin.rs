@@ -46,7 +46,7 @@ impl Pixels {
     pub fn of_file(aovs: &Aovs) -> Self {
         let (layers, pixels) = (Layers::new(aovs), 0..aovs.film.pixels());
         Self {
-            size: [aovs.film.width, aovs.film.height],
+            size: aovs.film.size(),
             holds: layers.holds(),
             stats: pixels.clone().map(|i| layers.stats(i)).collect(),
             light: pixels.clone().map(|i| layers.light(i)).collect(),

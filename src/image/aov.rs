@@ -319,7 +319,7 @@ fn absent(film: &Film, known: &Known, name: &str) -> String {
 }
 
 fn extent(film: &Film, window: Option<Window>) -> String {
-    let w = window.unwrap_or(Window { first: [0, 0], size: [film.width, film.height] });
+    let w = window.unwrap_or(Window { first: [0, 0], size: film.size() });
     format!("{}x{} pixels from ({}, {})", w.size[0], w.size[1], w.first[0], w.first[1])
 }
 

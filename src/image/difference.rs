@@ -46,7 +46,7 @@ pub fn false_colours(width: u32, values: &[f32], top: f32) -> Picture {
 }
 
 fn errors(test: &Picture, reference: &Picture) -> Vec<f32> {
-    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    assert_eq!(test.size(), reference.size(), "pictures of one size");
     let error = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).sum::<f32>() / 3.0;
     test.pixels.iter().zip(&reference.pixels).map(error).collect()
 }

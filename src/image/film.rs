@@ -116,6 +116,11 @@ impl Film {
         Self { width, height, ..Self::default() }
     }
 
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// Number of pixels.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize

@@ -39,7 +39,7 @@ pub fn compare(test: &Picture, reference: &Picture) -> Metrics {
 /// # Panics
 /// When their sizes differ.
 pub fn unseen(test: &Picture, reference: &Picture) -> f64 {
-    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    assert_eq!(test.size(), reference.size(), "pictures of one size");
     let beyond = |a: f32, b: f32| a == b || (a <= 0.0 && b <= 0.0) || (a >= 1.0 && b >= 1.0);
     let is_unseen = |(a, b): &(&[f32; 3], &[f32; 3])| a != b && (0..3).all(|c| beyond(a[c], b[c]));
     let count = test.pixels.iter().zip(&reference.pixels).filter(is_unseen).count();
@@ -57,7 +57,7 @@ fn values(picture: &Picture) -> impl Iterator<Item = f32> + '_ {
 }
 
 fn mean(test: &Picture, reference: &Picture, error: impl Fn(f64, f64) -> f64) -> f64 {
-    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    assert_eq!(test.size(), reference.size(), "pictures of one size");
     let sum: f64 = values(test).zip(values(reference)).map(|(a, b)| error(a.into(), b.into())).sum();
     sum / (3 * test.pixels.len()) as f64
 }
@@ -83,7 +83,7 @@ pub fn mse(test: &Picture, reference: &Picture) -> f64 {
 /// # Panics
 /// When their sizes differ.
 pub fn relative_squares(test: &Picture, reference: &Picture) -> Vec<f64> {
-    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    assert_eq!(test.size(), reference.size(), "pictures of one size");
     let square = |a: f32, b: f32| {
         let (a, b) = (f64::from(a), f64::from(b));
         (a - b) * (a - b) / (b * b + RELMSE_EPSILON)
@@ -118,7 +118,7 @@ pub fn relative_noise(reference: &Picture, variance: &[[f32; 3]]) -> f64 {
 /// # Panics
 /// When their sizes differ.
 pub fn hdr_flip(test: &Picture, reference: &Picture) -> Option<f64> {
-    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    assert_eq!(test.size(), reference.size(), "pictures of one size");
     let image = |p: &Picture| flip_rs::RgbImage::new(p.width as usize, p.height as usize, values(p).collect()).ok();
     let mut options = flip_rs::HdrOptions::default();
     options.return_exposure_map = false;

@@ -107,7 +107,7 @@ pub fn plan(
     target: Target,
 ) -> Result<Plan> {
     check(settings, methods, target)?;
-    let size = [settings.width, settings.height];
+    let size = settings.size();
     let filters = !methods.iter().all(|method| method.is_none());
     if filters {
         filter::check_size(gpu, size, filter::GUIDE_TEXELS)?;
@@ -255,7 +255,7 @@ impl Plan {
     /// # Errors
     /// [`Error::Usage`] for another scene.
     pub fn check_scene(&self, scene: &Scene) -> Result<()> {
-        let found = scene.fingerprint([self.settings.width, self.settings.height])?.to_string();
+        let found = scene.fingerprint(self.settings.size())?.to_string();
         match found == self.scene {
             true => Ok(()),
             false => {

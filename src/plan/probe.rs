@@ -171,7 +171,7 @@ impl<'a> Probe<'a> {
             *(if traces { &mut samples_ms } else { &mut start_ms }) += ms;
         }
         let noisy = self.renderer.picture()?.finite().map_err(Error::Device)?;
-        let size = [noisy.width, noisy.height];
+        let size = noisy.size();
         let mut image =
             Image { noisy: noisy.pixels, filtered: Vec::new(), start_ms, samples_ms, filter_ms: Vec::new() };
         for method in 0..self.methods.len() {

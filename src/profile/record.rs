@@ -179,7 +179,7 @@ impl Profile {
             schema: SCHEMA,
             tallow: env!("CARGO_PKG_VERSION").to_owned(),
             scene: path.display().to_string(),
-            scene_fingerprint: scene.fingerprint([settings.width, settings.height])?.to_string(),
+            scene_fingerprint: scene.fingerprint(settings.size())?.to_string(),
             settings: settings.clone(),
             denoise: None,
             host: Host::of(gpu),

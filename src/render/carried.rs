@@ -48,7 +48,7 @@ impl Renderer {
     /// [`Error::Device`].
     pub fn take_up(&self, frame: &mut FrameResources, film: &Film, scene: &Scene) -> Result<()> {
         let history = self.frame.history()?;
-        let (wanted, found) = ([self.settings.width, self.settings.height], [film.width, film.height]);
+        let (wanted, found) = (self.settings.size(), film.size());
         if wanted != found {
             return Err(Error::Usage(format!("a film of {found:?} pixels cannot go on as one of {wanted:?}")));
         }

@@ -24,7 +24,7 @@ impl Renderer {
     /// [`Error::Usage`] for a setting out of range or `indirect_stride`, for a renderer without guides and for a film that is too large;
     /// [`Error::Device`].
     pub fn keep_history(&mut self, settings: Reproject, moves: Moves) -> Result<()> {
-        let (pixels, size) = (self.settings.pixels(), [self.settings.width, self.settings.height]);
+        let (pixels, size) = (self.settings.pixels(), self.settings.size());
         if !self.frame.film.tiles[0].has_guide() {
             let what = "a history needs primary hits: make the renderer with Outputs::guides";
             return Err(Error::Usage(what.into()));
@@ -123,7 +123,7 @@ impl Renderer {
 /// # Errors
 /// [`Error::Usage`] with what speaks against it: a lens, parallel rays, too many pixels, or settings under which no budget is placed.
 pub fn can_carry(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<()> {
-    History::check_camera(&scene.camera([settings.width, settings.height])?)?;
+    History::check_camera(&scene.camera(settings.size())?)?;
     History::check_room(gpu, settings.pixels() as u32)?;
     check_placing(settings)
 }

@@ -76,7 +76,7 @@ impl Provenance {
     /// # Errors
     /// When the film is of another scene.
     pub(crate) fn shows(&self, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
-        let shown = scene.fingerprint([settings.width, settings.height]).map_err(|e| e.to_string())?;
+        let shown = scene.fingerprint(settings.size()).map_err(|e| e.to_string())?;
         if self.scene == shown.to_string() {
             return Ok(());
         }
@@ -130,7 +130,7 @@ fn json(what: &impl Serialize) -> Result<String> {
 /// # Errors
 /// Those of [`Scene::fingerprint`].
 pub fn of_frame(scene: &Scene, settings: &Settings, history: &str) -> Result<BTreeMap<String, String>> {
-    let shown = scene.fingerprint([settings.width, settings.height])?;
+    let shown = scene.fingerprint(settings.size())?;
     let entries = [(SETTINGS, json(settings)?), (SCENE, shown.to_string()), (HISTORY, history.to_owned())];
     Ok(entries.map(|(key, value)| (key.to_owned(), value)).into())
 }

@@ -11,7 +11,7 @@ pub fn priority_push(scene: &Scene, s: &Settings) -> PriorityPush {
     let [low, high] = scene.bounds.map(glam::Vec3::from);
     let sigma = (a.geometry.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
     PriorityPush {
-        size: [s.width, s.height],
+        size: s.size(),
         window: a.geometry.window,
         normal_scale: a.geometry.sigma_normal.max(f32::MIN_POSITIVE.sqrt()).powi(-2),
         position_scale: sigma.powi(-2),
@@ -31,16 +31,13 @@ pub fn priority_push(scene: &Scene, s: &Settings) -> PriorityPush {
 /// # Errors
 /// Those of [`Scene::camera`].
 pub fn frame_constants(scene: &Scene, settings: &Settings) -> Result<FrameConstants> {
-    Ok(FrameConstants {
-        camera: scene.camera([settings.width, settings.height])?,
-        path: path_constants(scene, settings),
-    })
+    Ok(FrameConstants { camera: scene.camera(settings.size())?, path: path_constants(scene, settings) })
 }
 
 fn path_constants(scene: &Scene, settings: &Settings) -> PathConstants {
     let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
     PathConstants {
-        size: [settings.width, settings.height],
+        size: settings.size(),
         seed: settings.seed,
         max_depth: settings.max_depth,
         roulette_depth: settings.roulette_depth,

@@ -83,9 +83,9 @@ impl Rendered {
 }
 
 fn check_size(film: &Film, settings: &Settings) -> Result<(), String> {
-    let (width, height) = (settings.width, settings.height);
     let is_cut = film.channels.iter().any(|c| c.window.is_some());
-    if (film.width, film.height) != (width, height) || is_cut {
+    if film.size() != settings.size() || is_cut {
+        let [width, height] = settings.size();
         let size = format!("{}x{}{}", film.width, film.height, if is_cut { ", in part" } else { "" });
         return Err(format!("is {size}, but was rendered as {width}x{height}: take the file as tallow wrote it"));
     }

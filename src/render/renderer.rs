@@ -151,7 +151,7 @@ impl Renderer {
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
         let (constants, priority_push) = (frame_constants(scene, settings)?, priority_push(scene, settings));
         let (soft_lights, stack) = (scene.has_soft_lights(), scene.stack);
-        let fingerprint = Some(scene.fingerprint([settings.width, settings.height])?);
+        let fingerprint = Some(scene.fingerprint(settings.size())?);
         let serial = Some(scene.serial());
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         let (settings, first_sample) = (settings.clone(), settings.first_sample);

@@ -61,9 +61,8 @@ impl Renderer {
         self.frame.constants = constants;
         self.frame.priority_push = priority_push(scene, &self.settings);
         self.soft_lights = scene.has_soft_lights();
-        let size = [self.settings.width, self.settings.height];
         if change.camera || self.fingerprint.is_some() {
-            self.fingerprint = Some(scene.fingerprint(size)?);
+            self.fingerprint = Some(scene.fingerprint(self.settings.size())?);
         }
         self.serial = Some(scene.serial());
         Ok(())

@@ -308,7 +308,7 @@ impl<'a> SceneFile<'a> {
         let named: Vec<_> = self.files.iter().chain(&of_models).cloned().collect();
         scene.files.retain(|file| !named.contains(file)); // a model is a scene, and its mesh
         scene.files.splice(0..0, named);
-        let camera = scene.view.build([settings.width, settings.height], scene.bounds);
+        let camera = scene.view.build(settings.size(), scene.bounds);
         camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
         let (animation, warnings) = animation::load(&self.path, &description, &movers, &scene)?;
         scene.warnings.extend(warnings);

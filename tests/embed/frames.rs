@@ -96,7 +96,7 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
         assert!(record(&renderer) == expected, "{policy}: the engine's pixels are not those of the command line");
     }
     // Control: another camera must change the picture.
-    let mut camera = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
+    let mut camera = scene.camera(scene.settings.size()).unwrap();
     camera.position[0] += 0.1;
     renderer.set_camera(camera).unwrap();
     assert!(record(&renderer) != expected, "{policy}: the comparison cannot fail");

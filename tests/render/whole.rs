@@ -107,7 +107,7 @@ fn samples_know_their_rays() {
 fn a_recorded_frame_keeps_its_camera() {
     let gpu = support::gpu();
     let scene = scene("cornell-box/scene.toml", small);
-    let still = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
+    let still = scene.camera(scene.settings.size()).unwrap();
     let moved = tallow::layout::Camera { near: still.near + 0.1, position: [0.1, 1.0, 6.0], ..still };
     let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let expected = [still, moved].map(|camera| {

@@ -107,7 +107,7 @@ fn the_film_has_the_shape_of_the_camera_unless_it_is_absurd() {
         let loaded = load(&json);
         let odd =
             loaded.warnings.iter().any(|line| line.contains("camera \"camera 0\"") || line.contains("camera \"eye\""));
-        ([loaded.settings.width, loaded.settings.height], odd)
+        (loaded.settings.size(), odd)
     };
     let seen = |yfov: f64, ratio: f64| {
         size(json!({ "type": "perspective", "perspective": { "yfov": yfov, "znear": 0.1, "aspectRatio": ratio } }))

@@ -72,7 +72,7 @@ fn the_fingerprint_is_that_of_what_is_seen() {
     let text = format!("{BOX}{more}");
     let of = |text: &str| {
         let Loaded { scene, settings, .. } = parse(text).unwrap();
-        scene.fingerprint([settings.width, settings.height]).unwrap()
+        scene.fingerprint(settings.size()).unwrap()
     };
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

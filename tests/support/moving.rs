@@ -58,7 +58,7 @@ impl Film {
     fn following(gpu: &Gpu, scene: &Loaded, settings: Reproject, moves: Moves, outputs: Outputs) -> Self {
         let mut renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
         renderer.keep_history(settings, moves).unwrap();
-        let camera = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
+        let camera = scene.camera(scene.settings.size()).unwrap();
         Self { gpu: gpu.clone(), renderer, frame: FrameResources::new(gpu).unwrap(), camera, begun: false }
     }
 

@@ -33,7 +33,7 @@ fn scene(file: &str, [width, height]: [u32; 2]) -> Loaded {
 fn push(scene: &Loaded, s: Reproject) -> ReprojectPush {
     let settings = &scene.settings;
     ReprojectPush {
-        size: [settings.width, settings.height],
+        size: settings.size(),
         first_pixel: 0,
         pixels: settings.pixels() as u32,
         view: s.reproject_error,

@@ -49,7 +49,7 @@ fn rendered(gpu: &Gpu, scene: &Loaded, plan: &Plan) -> Result<(f64, Picture)> {
     if let Some(method) = method {
         let clean = Filtered::new(gpu, Noisy::of_film(&renderer)?, &Recipe::new(method))?.join(gpu)?;
         times.extend(clean.times);
-        picture = Picture::of_planes([picture.width, picture.height], &clean.colour);
+        picture = Picture::of_planes(picture.size(), &clean.colour);
     }
     Ok((total_ms(&times), picture))
 }

@@ -26,7 +26,7 @@ impl Shown {
             times(&OUT, v.map(curve)).map(|v: f32| v.clamp(0.0, 1.0).powf(1.0 / 2.2))
         };
         let pixels: Vec<_> = picture.pixels.iter().map(show).collect();
-        Self { size: [picture.width, picture.height], alpha: vec![1.0; pixels.len()], pixels }
+        Self { size: picture.size(), alpha: vec![1.0; pixels.len()], pixels }
     }
 
     /// Averages squares of so many pixels.

@@ -64,7 +64,7 @@ pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
             "has other primaries than the first image, and variances cannot be converted: render both in the same";
         return Err(Error::input(b, what));
     }
-    let [a_size, b_size] = sides.each_ref().map(|side| [side.film.width, side.film.height]);
+    let [a_size, b_size] = sides.each_ref().map(|side| side.film.size());
     check_sizes((a, a_size), (b, b_size))?;
     image::check_memory(a, sides[0].film.pixels() as u64 * BYTES_PER_PIXEL)?;
     let options = Options { false_alarms: args.false_alarms, accept: args.accept, resolve: args.resolve, at: args.at };

@@ -18,7 +18,7 @@ use std::path::Path;
 pub fn run(args: &Args, image: &Path) -> Result<Exit> {
     let film = image::read(image)?;
     let file = args.reference.as_deref().ok_or_else(|| Error::Usage("--filter-only needs --reference".to_owned()))?;
-    let size = [film.width, film.height];
+    let size = film.size();
     let plan = FilterPlan {
         path: image,
         film: &film,

@@ -62,8 +62,8 @@ impl Supersampling {
 fn settings(aovs: &Aovs, provenance: &Provenance) -> std::result::Result<Settings, String> {
     aovs.get(Aov::Direct).ok_or("has no direct light: --scene needs an .exr file of tallow render")?;
     let settings = Settings::deserialize(&provenance.settings).map_err(|e| format!("settings: {e}"))?;
-    let [width, height] = [aovs.film.width, aovs.film.height];
-    if [settings.width, settings.height] != [width, height] {
+    if settings.size() != aovs.film.size() {
+        let [width, height] = aovs.film.size();
         return Err(format!("is {width}x{height}, but was rendered as {}x{}", settings.width, settings.height));
     }
     Ok(Settings { allocate: Allocate::default(), ..settings })

@@ -59,7 +59,7 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
 
 /// Frames may run for long; what they cannot be compared with is told before.
 fn check_beside(old: &Profile, scene: &Scene, settings: &Settings, filter: Option<&Row>) -> Result<()> {
-    let scene_fingerprint = &scene.fingerprint([settings.width, settings.height])?.to_string();
+    let scene_fingerprint = &scene.fingerprint(settings.size())?.to_string();
     Subject { settings, scene_fingerprint, denoise: filter.map(|row| row.name) }.check_beside(old)
 }
 

@@ -9,12 +9,12 @@ use std::fmt::Write;
 pub fn of_profile(p: &Profile) -> String {
     let settings = &p.settings;
     let filter = p.denoise.as_deref().map(|name| format!(", filtered by {name}")).unwrap_or_default();
-    let (frames, size) = (p.frame_ms.samples.len(), [settings.width, settings.height]);
+    let frames = p.frame_ms.samples.len();
     let mut text = format!(
         "{}: {} x {}, {} spp{filter}, {frames} frames on {} ({}; {})\n\n",
         readable(&p.scene),
-        size[0],
-        size[1],
+        settings.width,
+        settings.height,
         settings.spp,
         p.host.device,
         p.host.driver,

@@ -65,9 +65,8 @@ impl<'a> Stage<'a> {
         scene.view.framed = survey.bounds().or(scene.view.framed);
         let framed = scene.view.framed;
         if let Some(degrees) = args.turntable {
-            let size = [settings.width, settings.height];
             let span = f64::from(frames.start) / args.fps..f64::from(frames.end) / args.fps;
-            animation.movers.push(Arc::new(Turntable::new(&scene, size, degrees, span)));
+            animation.movers.push(Arc::new(Turntable::new(&scene, settings.size(), degrees, span)));
         }
         let mut warnings = scene.warnings.clone();
         if animation.is_empty() {

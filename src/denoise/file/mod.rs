@@ -88,7 +88,7 @@ impl<'a> Layers<'a> {
     pub fn upload(&self, gpu: &Gpu) -> Result<Noisy> {
         let (pixels, holds) = (self.aovs.film.pixels(), self.holds());
         Ok(Noisy {
-            size: [self.aovs.film.width, self.aovs.film.height],
+            size: self.aovs.film.size(),
             stats: filled(gpu, "stats", pixels, |i| self.stats(i))?,
             light: filled(gpu, "light", if holds.light { pixels } else { 1 }, |i| self.light(i))?,
             guide: filled(gpu, "guide", pixels, |i| self.guide(i))?,

@@ -32,7 +32,7 @@ impl AsLight {
 
 /// The twin: `filtered` with no light below 0 and below that of all known pixels around in `input`.
 pub fn as_light(input: &FilterInput, filtered: Vec<vec4>) -> Vec<vec4> {
-    let [width, height] = [input.width, input.height].map(i64::from);
+    let [width, height] = input.size().map(i64::from);
     let least = |i: i64| {
         let around = (-REACH..=REACH).flat_map(|v| (-REACH..=REACH).map(move |u| (u, v)));
         let taps = around.map(|(u, v)| {

@@ -125,7 +125,7 @@ struct Level<'a> {
 
 /// Every level in turn, tap by tap.
 fn reference(input: &FilterInput, edge: &EdgeSettings, own: &AtrousSettings, levels: u32) -> Vec<vec4> {
-    let (mut image, size) = (Packed::reference(input), [input.width, input.height].map(i64::from));
+    let (mut image, size) = (Packed::reference(input), input.size().map(i64::from));
     for level in 0..levels {
         let (rates, conserve) = (own.rates(edge, level), own.conserve_energy);
         let filter = Level { image: &image, size, spacing: 1 << level, rates, conserve };

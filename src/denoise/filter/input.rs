@@ -20,6 +20,11 @@ pub struct FilterInput {
 }
 
 impl FilterInput {
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// Other light on the same surfaces.
     pub fn with_radiance(&self, radiance: Vec<vec4>) -> Self {
         Self { radiance, guide: self.guide.clone(), variance: None, ..*self }

@@ -152,7 +152,7 @@ impl Planes {
     pub fn new(gpu: &Gpu, input: &FilterInput) -> Result<Self> {
         let variance = input.variance.as_ref();
         Ok(Self {
-            size: [input.width, input.height],
+            size: input.size(),
             radiance: Buffer::from_slice(gpu, "radiance", &input.radiance)?,
             guide: Buffer::from_slice(gpu, "guide", &input.guide)?,
             light: None,
@@ -204,7 +204,7 @@ const _: () = assert!(size_of::<Guide>().is_multiple_of(16), "kernels read guide
 pub fn run(gpu: &Gpu, row: &Row, input: &FilterInput, settings: &FilterSettings) -> Result<(Vec<vec4>, Vec<PassTime>)> {
     settings.validate()?;
     input.validate()?;
-    check_size(gpu, [input.width, input.height], GUIDE_TEXELS)?; // before anything is uploaded
+    check_size(gpu, input.size(), GUIDE_TEXELS)?; // before anything is uploaded
     let planes = Planes::new(gpu, input)?;
     let filter = row.compile(gpu, settings, planes.size)?;
     let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| filter.record(rec, &planes))?;

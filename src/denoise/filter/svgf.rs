@@ -154,7 +154,7 @@ struct Level<'a> {
 fn reference(input: &FilterInput, edge: &EdgeSettings, own: &SvgfSettings, levels: u32) -> Vec<vec4> {
     let image = Packed::reference(input);
     let noise = noise_estimate::reference(input, &image, edge, false);
-    filtered([input.width, input.height], image.into_iter().zip(noise).collect(), edge, own, levels, true)
+    filtered(input.size(), image.into_iter().zip(noise).collect(), edge, own, levels, true)
 }
 
 /// The levels on an image whose noise is known; `narrows` says whether weights do with the number of samples.

@@ -105,7 +105,7 @@ impl Estimate {
     /// # Errors
     /// When sizes differ, or a value is not finite or a standard error negative.
     pub fn with_errors(film: &Film, errors: &Picture) -> Result<Self, String> {
-        if (film.width, film.height) != (errors.width, errors.height) {
+        if film.size() != errors.size() {
             return Err(format!("the standard errors are {}x{}, its image is not", errors.width, errors.height));
         }
         if errors.pixels.iter().flatten().any(|e| *e < 0.0) {

@@ -141,6 +141,11 @@ impl Settings {
         said.collect::<Vec<_>>().join("; ")
     }
 
+    /// Width and height of the film.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// Number of pixels of the film.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize

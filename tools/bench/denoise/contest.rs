@@ -92,7 +92,7 @@ fn images(
         // The first run makes kernels and loads weights.
         for _ in 0..=args.runs {
             let Clean { colour, times, expected: told, .. } = contender.filter(gpu, Noisy::of_film(&renderer)?)?;
-            picture = Picture::of_planes([noisy.width, noisy.height], &colour);
+            picture = Picture::of_planes(noisy.size(), &colour);
             took.push(total_ms(&times));
             expected = told;
         }

@@ -32,7 +32,7 @@ impl Reference {
         }
         let film = image::read(file)?;
         let [width, height] = view.size;
-        ensure!([film.width, film.height] == view.size, "{}: is not {width} x {height}", file.display());
+        ensure!(film.size() == view.size, "{}: is not {width} x {height}", file.display());
         Self::of_film(&film).with_context(|| format!("{}", file.display()))
     }
 

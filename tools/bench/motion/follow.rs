@@ -173,7 +173,7 @@ fn picture(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<(Picture, Fi
     let noisy = film.picture(None).map_err(|what| anyhow!(what))?;
     let method = Method::all().find(|method| method.name() == "guided").context("a filter of that name")?;
     let clean = Filtered::new(gpu, Noisy::of_film(&renderer)?, &Recipe::new(method))?.join(gpu)?;
-    let filtered = Picture::of_planes([noisy.width, noisy.height], &clean.colour);
+    let filtered = Picture::of_planes(noisy.size(), &clean.colour);
     Ok((noisy, film, filtered))
 }
 

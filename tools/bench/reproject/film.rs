@@ -82,7 +82,7 @@ impl Film {
         let method = Method::all().find(|method| method.name() == name).context("a filter of that name")?;
         let Clean { colour, times, .. } =
             Filtered::new(&self.gpu, Noisy::of_film(&self.renderer)?, &Recipe::new(method))?.join(&self.gpu)?;
-        Ok((Picture::of_planes([picture.width, picture.height], &colour), total_ms(&times)))
+        Ok((Picture::of_planes(picture.size(), &colour), total_ms(&times)))
     }
 }
 

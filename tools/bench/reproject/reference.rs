@@ -19,7 +19,7 @@ pub struct Reference {
 impl Reference {
     /// Renders it, or reads it from `file`, and keeps it there.
     pub fn new(gpu: &Gpu, scene: &Loaded, camera: Camera, spp: u32, file: Option<&Path>) -> Result<Self> {
-        let size = [scene.settings.width, scene.settings.height];
+        let size = scene.settings.size();
         let film = match file {
             Some(file) if file.exists() => image::read(file)?,
             _ => {
@@ -28,7 +28,7 @@ impl Reference {
                 film
             }
         };
-        ensure!([film.width, film.height] == size, "a reference of {} x {} pixels", film.width, film.height);
+        ensure!(film.size() == size, "a reference of {} x {} pixels", film.width, film.height);
         let layer = |name| film.picture(name).map_err(|what| anyhow!(what));
         Ok(Self { picture: layer(None)?, variance: layer(Some("variance"))?.pixels })
     }

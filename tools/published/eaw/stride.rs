@@ -97,7 +97,7 @@ fn one(
         renderer.set_seed(100 + seed);
         let status = Job::new(&renderer).run_to_end(&mut frame)?;
         let clean = timed(gpu, Noisy::of_film(&renderer)?, &recipe)?;
-        let picture = Picture::of_planes([reference.width, reference.height], &clean.colour);
+        let picture = Picture::of_planes(reference.size(), &clean.colour);
         let errors = metrics::compare(&picture, reference);
         let row = [total_ms(&status.times), total_ms(&clean.times), errors.relmse, errors.flip];
         sums = std::array::from_fn(|k| sums[k] + row[k] / f64::from(SEEDS));

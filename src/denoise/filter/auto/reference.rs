@@ -55,7 +55,7 @@ impl Results {
         );
         // The probe does not change what is known of noise.
         let noise = noise_estimate::reference(input, image, &rows[3].edge, false);
-        let (size, s) = ([input.width, input.height], &rows[3]);
+        let (size, s) = (input.size(), &rows[3]);
         let svgf = |added: &dyn Fn(usize) -> f32| -> Vec<Vec4> {
             let pixel = |i: usize| (Packed { colour: image[i].colour + added(i), ..image[i] }, noise[i]);
             let output = svgf::filtered(
@@ -120,9 +120,9 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     let (image, floor) = (Packed::reference(input), floor(settings));
     let noise = noise_estimate::reference(input, &image, &settings.edge, true);
     let results = Results::new(input, &image, settings);
-    let cells = Cells::new(&image, [input.width, input.height], &settings.edge);
+    let cells = Cells::new(&image, input.size(), &settings.edge);
     let smoothed = |plane: Vec<Vec4>, across: bool| cells.smoothed(&plane, across);
-    let size = [input.width, input.height].map(i64::from);
+    let size = input.size().map(i64::from);
     let surroundings = smoothed(results.leverages.clone(), false);
     let surfaces = Rates::of_surfaces(&settings.edge);
     let differ = |i: usize| differences(&image, &noise, size, i, &surfaces, floor, results.wide[i].xyz());

@@ -17,7 +17,7 @@ pub fn given_back(
     surfaces: &Rates,
     prior: impl Fn(usize) -> f32,
 ) -> Vec<vec4> {
-    let size = [input.width, input.height].map(i64::from);
+    let size = input.size().map(i64::from);
     let own: Vec<Option<f32>> = (0..image.len()).map(|i| own_variance(input, i, image[i].count)).collect();
     let doubted = |i: usize| image[i].count >= ENOUGH_TO_DOUBT && !blurred(&input.guide[i]);
     let residual = |i: usize| Residual {

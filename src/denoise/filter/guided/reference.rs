@@ -40,7 +40,7 @@ impl<'a> Image<'a> {
             guide: channels(g, own.channels, extent),
         };
         let pixels = input.radiance.iter().zip(&input.guide).map(pixel).collect();
-        let size = [input.width, input.height];
+        let size = input.size();
         let step = if own.sums == GuidedSums::Table { 1 } else { step(radius) };
         let blocks = size.map(|edge| edge.div_ceil(step));
         Self { input, pixels, size, blocks, step, radius: radius / step, eps: &own.eps }

@@ -114,7 +114,7 @@ fn is_idle<T: PartialEq>([r, g, b, alpha]: [T; 4], full: T) -> bool {
 
 fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> Checked {
     let film = decode(bytes)?;
-    if [film.width, film.height] != size {
+    if film.size() != size {
         return Err("its header says another size".to_owned());
     }
     let colour = if matches!(kind, Kind::Color | Kind::Light) { film.rec709(None)? } else { film.picture(None)? };
