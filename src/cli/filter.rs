@@ -193,7 +193,7 @@ fn bytes_needed(args: &Args, claim: &Claim, unified: bool) -> u64 {
 /// Checks before decoding, which can take minutes, that the image can be filtered.
 fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
     if !asks_for_nothing(args) {
-        filter::check_size(gpu, claim.size, filter::GUIDE_TEXELS)?;
+        filter::check_size(gpu, claim.size)?;
     }
     let bytes = bytes_needed(args, claim, gpu.info().unified);
     let refused =

@@ -242,7 +242,7 @@ pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Re
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);
     memory::check_beside_driver(bytes).map_err(|what| Error::Device(refused(what)))?;
     if denoise.is_some() {
-        filter::check_size(gpu, size, filter::GUIDE_TEXELS)?;
+        filter::check_size(gpu, size)?;
     }
     Ok(())
 }

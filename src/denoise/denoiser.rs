@@ -55,7 +55,7 @@ impl Denoiser {
                 "what is filtered is light that not every pixel has (indirect_stride): choose Demodulation::Light";
             return Err(Error::Usage(what.to_owned()));
         }
-        filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
+        filter::check_size(gpu, noisy.size)?;
         let allocate = &renderer.settings().allocate;
         let in_paint = apart && !allocate.is_even() && allocate.min_spp == 0;
         if in_paint && noisy.holds().indirect_stride > 1 {

@@ -102,7 +102,7 @@ impl Filtered {
     /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the image is too large or the
     /// device fails.
     pub fn new(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
-        filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
+        filter::check_size(gpu, noisy.size)?;
         recipe.method.check_stride(noisy.holds().indirect_stride)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;

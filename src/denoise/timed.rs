@@ -60,7 +60,7 @@ pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
 
 /// The same for Open Image Denoise: its own pass is timed by the host's clock, and loading the library is part of the first run.
 fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
-    filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
+    filter::check_size(gpu, noisy.size)?;
     let before = gpu.allocated_bytes();
     let begun = Instant::now();
     let parts =
@@ -95,7 +95,7 @@ impl<'a> Chain<'a> {
     /// # Errors
     /// Those of [`timed`].
     pub(crate) fn new(gpu: &'a Gpu, noisy: Noisy, recipe: &Recipe, row: &Row) -> Result<Self> {
-        filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
+        filter::check_size(gpu, noisy.size)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
         let parts = Demodulated::new(gpu, &noisy, demodulation, recipe.blurred(), in_paint, recipe.fireflies())?;

@@ -110,7 +110,7 @@ pub fn plan(
     let size = settings.size();
     let filters = !methods.iter().all(|method| method.is_none());
     if filters {
-        filter::check_size(gpu, size, filter::GUIDE_TEXELS)?;
+        filter::check_size(gpu, size)?;
     }
     let mut probe = Probe::new(gpu, scene, settings, outputs.or(Outputs::for_filter(filters)), methods)?;
     let levels = probe.levels(target)?;

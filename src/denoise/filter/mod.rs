@@ -76,7 +76,7 @@ impl Row {
         if size.contains(&0) {
             return Err(Error::Usage(format!("an image of {} x {} has no pixel to filter", size[0], size[1])));
         }
-        check_size(gpu, size, GUIDE_TEXELS)?;
+        check_size(gpu, size)?;
         Ok(Box::new(Fitted { filter: (self.make)(gpu, settings, size)?, size }))
     }
 }
@@ -172,14 +172,18 @@ pub fn find(name: &str) -> Option<&'static Row> {
     FILTERS.iter().copied().find(|row| row.name == name)
 }
 
-/// Refuses images whose planes a binding cannot hold, with `texels` texels a pixel in the widest that is read, and edges along
-/// which threads would walk longer than a software device lets them (`glsl/shared/loop_limit.glsl`).
+/// Texels of a pixel's guide, the widest plane that is read.
+const GUIDE_TEXELS: u64 = (size_of::<Guide>() / 16) as u64;
+const _: () = assert!(size_of::<Guide>().is_multiple_of(16), "kernels read guides in texels of 16 bytes");
+
+/// Refuses images whose planes a binding cannot hold, and edges along which threads would walk longer than a software device lets them
+/// (`glsl/shared/loop_limit.glsl`).
 ///
 /// # Errors
 /// [`Error::Device`].
-pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<()> {
+pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<()> {
     let info = gpu.info();
-    let most = (info.max_storage_range / size_of::<vec4>() as u64).min(info.max_texel_elements / texels);
+    let most = (info.max_storage_range / size_of::<vec4>() as u64).min(info.max_texel_elements / GUIDE_TEXELS);
     let longest = gpu.tuning().longest_edge.min(most);
     // `guided` pads its rows.
     let padded = u64::from(width).next_multiple_of(8) * u64::from(height);
@@ -192,10 +196,6 @@ pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<(
     }
 }
 
-/// Texels of a pixel's guide; those of its variance are not more.
-pub const GUIDE_TEXELS: u64 = (size_of::<Guide>() / 16) as u64;
-const _: () = assert!(size_of::<Guide>().is_multiple_of(16), "kernels read guides in texels of 16 bytes");
-
 /// Filters one image: uploads it, runs `row` on it and reads the result; also what each pass took.
 ///
 /// # Errors
@@ -204,7 +204,7 @@ const _: () = assert!(size_of::<Guide>().is_multiple_of(16), "kernels read guide
 pub fn run(gpu: &Gpu, row: &Row, input: &FilterInput, settings: &FilterSettings) -> Result<(Vec<vec4>, Vec<PassTime>)> {
     settings.validate()?;
     input.validate()?;
-    check_size(gpu, input.size(), GUIDE_TEXELS)?; // before anything is uploaded
+    check_size(gpu, input.size())?; // before anything is uploaded
     let planes = Planes::new(gpu, input)?;
     let filter = row.compile(gpu, settings, planes.size)?;
     let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| filter.record(rec, &planes))?;
