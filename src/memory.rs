@@ -1,6 +1,6 @@
 //! Checks of free host memory before large allocations. Operating systems grant more memory than there is and kill the
 //! process when it uses it, so the amount is checked first.
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use std::fmt::Display;
 use sysinfo::{MemoryRefreshKind, System};
 
@@ -17,7 +17,7 @@ const OPEN_DRIVER: u64 = 256 << 20;
 ///
 /// # Errors
 /// A message with the needed and the free amount.
-pub fn check(needed: u64) -> std::result::Result<(), String> {
+pub fn check(needed: u64) -> Checked {
     if needed < SMALL {
         return Ok(());
     }
@@ -40,7 +40,7 @@ pub fn check(needed: u64) -> std::result::Result<(), String> {
 ///
 /// # Errors
 /// As [`check`].
-pub fn check_beside_driver(needed: u64) -> std::result::Result<(), String> {
+pub fn check_beside_driver(needed: u64) -> Checked {
     check(needed.saturating_add(free_addresses().map_or(0, |_| OPEN_DRIVER)))
 }
 
@@ -84,7 +84,7 @@ pub fn vector<T>(what: impl Display, len: usize) -> Result<Vec<T>> {
 ///
 /// # Errors
 /// A message with the amount of memory that the system refused.
-pub fn reserved<T>(len: usize) -> std::result::Result<Vec<T>, String> {
+pub fn reserved<T>(len: usize) -> Checked<Vec<T>> {
     let mut vector = Vec::new();
     reserve_exact(&mut vector, len)?;
     Ok(vector)
@@ -98,7 +98,7 @@ pub fn reserve<T>(what: impl Display, vector: &mut Vec<T>, more: usize) -> Resul
     reserve_exact(vector, more).map_err(|lack| Error::Memory(format!("{what}: {lack}")))
 }
 
-fn reserve_exact<T>(vector: &mut Vec<T>, more: usize) -> std::result::Result<(), String> {
+fn reserve_exact<T>(vector: &mut Vec<T>, more: usize) -> Checked {
     let bytes = (more as u64).saturating_mul(size_of::<T>() as u64);
     let refused = |_| format!("needs {} of memory, which the system does not give", readable(bytes));
     vector.try_reserve_exact(more).map_err(refused)

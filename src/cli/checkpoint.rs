@@ -2,6 +2,7 @@
 //! the last one.
 use super::complain;
 use super::files::{Files, Item, first_with_layers, partial_name, scene_name};
+use crate::error::Checked;
 use crate::image::{Film, WriteOptions, output};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -30,7 +31,7 @@ pub fn default_output(scene: &Path) -> PathBuf {
 }
 
 /// Parses a duration that is given in minutes.
-pub fn minutes(text: &str) -> std::result::Result<Duration, String> {
+pub fn minutes(text: &str) -> Checked<Duration> {
     match text.parse::<f64>() {
         // A time that is too long to be represented never comes.
         Ok(minutes) if minutes > 0.0 => Ok(Duration::try_from_secs_f64(60.0 * minutes).unwrap_or(Duration::MAX)),

@@ -1,6 +1,6 @@
 //! Options shared by commands that run on a device or write pictures.
 use super::{complain, finite, print, print_json, quoted};
-use crate::error::Result;
+use crate::error::{Checked, Result};
 use crate::gpu::{self, DeviceOptions, Gpu, Tracing};
 use crate::image::{WriteOptions, tone::ToneMap};
 use crate::settings::entry::Entry;
@@ -113,7 +113,7 @@ impl PngOptions {
 ///
 /// # Errors
 /// A sentence with what is expected.
-pub fn frames_per_second(text: &str) -> std::result::Result<f64, String> {
+pub fn frames_per_second(text: &str) -> Checked<f64> {
     let fps = match text.split_once('/') {
         Some((frames, seconds)) => finite(frames)? / finite(seconds)?,
         None => finite(text)?,

@@ -17,7 +17,7 @@ pub mod progress;
 pub mod render;
 pub mod sequence;
 
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::gpu::Gpu;
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -214,7 +214,7 @@ fn check_png(option: &str, path: &Path) -> Result<()> {
 }
 
 /// Parses a finite number, for options where NaN would disable a check.
-fn finite(text: &str) -> std::result::Result<f64, String> {
+fn finite(text: &str) -> Checked<f64> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
         _ => Err("expected a finite number".to_owned()),
@@ -225,7 +225,7 @@ fn finite(text: &str) -> std::result::Result<f64, String> {
 fn within(
     range: impl RangeBounds<f64> + Clone + Send + Sync + 'static,
     expected: &'static str,
-) -> impl Fn(&str) -> std::result::Result<f64, String> + Clone {
+) -> impl Fn(&str) -> Checked<f64> + Clone {
     move |text| finite(text).ok().filter(|number| range.contains(number)).ok_or_else(|| format!("expected {expected}"))
 }
 

@@ -15,7 +15,7 @@ use super::{Exit, complain};
 use crate::allocate::Placing;
 use crate::denoise;
 use crate::denoise::filter::{self, Method};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::gpu::{Gpu, Tracing};
 use crate::image;
 use crate::memory;
@@ -213,7 +213,7 @@ pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
 }
 
 /// Parses a column and a row.
-fn pixel(text: &str) -> std::result::Result<[u32; 2], String> {
+fn pixel(text: &str) -> Checked<[u32; 2]> {
     let numbers = text.split_once(',').map(|(x, y)| (x.trim().parse(), y.trim().parse()));
     match numbers {
         Some((Ok(x), Ok(y))) => Ok([x, y]),

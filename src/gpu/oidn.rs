@@ -1,6 +1,6 @@
 //! Open Image Denoise, loaded when it is asked for: a program that is built without it finds it where it is installed. It runs on
 //! the host's processor.
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use bytemuck::Pod;
 use libloading::Library;
 use std::env;
@@ -38,7 +38,7 @@ macro_rules! functions {
 
         impl Functions {
             /// The library stays loaded, because it may have threads of its own.
-            fn of(library: Library) -> std::result::Result<Self, String> {
+            fn of(library: Library) -> Checked<Self> {
                 let missing = |symbol| format!("it is no Open Image Denoise 2 (it has no {symbol})");
                 // SAFETY: version 2 of the library declares its functions so.
                 let functions = unsafe {
@@ -69,7 +69,7 @@ functions! {
 
 /// The library's functions; they are looked for once.
 fn functions() -> Result<&'static Functions> {
-    static LOADED: OnceLock<std::result::Result<Functions, String>> = OnceLock::new();
+    static LOADED: OnceLock<Checked<Functions>> = OnceLock::new();
     let load = || match env::var_os(OIDN_VARIABLE).filter(|file| !file.is_empty()) {
         Some(file) => load(&file).map_err(|what| format!("{OIDN_VARIABLE}: {what}")),
         None => installed(),
@@ -79,13 +79,13 @@ fn functions() -> Result<&'static Functions> {
 }
 
 /// The first of [`FILES`] that can be used; what is wrong with the first of all is what a user wants to know.
-fn installed() -> std::result::Result<Functions, String> {
+fn installed() -> Checked<Functions> {
     let mut found = FILES.iter().map(|file| load(&OsString::from(file)));
     let first = found.next().unwrap_or_else(|| Err("it has no known name on this system".to_owned()));
     first.or_else(|what| found.find_map(std::result::Result::ok).ok_or(what))
 }
 
-fn load(file: &OsString) -> std::result::Result<Functions, String> {
+fn load(file: &OsString) -> Checked<Functions> {
     // SAFETY: what a library runs when it is loaded is trusted as that of the Vulkan loader is: the system or the user names it.
     let library = unsafe { Library::new(file) }.map_err(|e| e.to_string())?;
     Functions::of(library).map_err(|what| format!("{}: {what}", file.display()))

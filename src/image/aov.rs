@@ -1,6 +1,7 @@
 //! The layers of an image that filters use (AOVs, arbitrary output variables). They are found by the channel names of
 //! Tallow, Blender (Cycles), Mitsuba 3, pbrt-v4, V-Ray, Arnold, Octane and Unreal.
 use super::film::{Channel, Film, NOISY, SOFTWARE, Samples, Window, split};
+use crate::error::Checked;
 use std::collections::BTreeMap;
 
 /// One kind of arbitrary output variable.
@@ -130,7 +131,7 @@ impl<'a> Aovs<'a> {
     /// # Errors
     /// When there is no colour or no pixel of it is a finite number, when a layer named by the user is missing, or when
     /// a layer covers other pixels than the colour.
-    pub fn find(film: &'a Film, names: &Names) -> Result<Self, String> {
+    pub fn find(film: &'a Film, names: &Names) -> Checked<Self> {
         Self::find_of(film, names, KNOWN)
     }
 
@@ -138,11 +139,11 @@ impl<'a> Aovs<'a> {
     ///
     /// # Errors
     /// As [`Aovs::find`].
-    pub fn find_shown(film: &'a Film, names: &Names) -> Result<Self, String> {
+    pub fn find_shown(film: &'a Film, names: &Names) -> Checked<Self> {
         Self::find_of(film, names, &[&[SHOWN], &KNOWN[1..]].concat())
     }
 
-    fn find_of(film: &'a Film, names: &Names, all: &[Known]) -> Result<Self, String> {
+    fn find_of(film: &'a Film, names: &Names, all: &[Known]) -> Checked<Self> {
         let given = names.get(&Aov::Colour).map(String::as_str);
         // The noisy image is the input of the filter and is never replaced.
         let shown = film
@@ -182,7 +183,7 @@ impl<'a> Aovs<'a> {
     }
 
     /// Says how many pixels hold no colour that a filter can use.
-    fn check_colour(&mut self) -> Result<(), String> {
+    fn check_colour(&mut self) -> Checked {
         let held = || (0..self.film.pixels()).filter(|&i| self.holds(i));
         let broken = |i: &usize| !self.planes[&Aov::Colour].at(*i).iter().all(|v| v.is_finite());
         let (all, count) = (held().count(), held().filter(broken).count());
@@ -208,7 +209,7 @@ impl<'a> Aovs<'a> {
         }
     }
 
-    fn take(&mut self, known: &Known, channels: Option<[&'a Channel; 3]>) -> Result<(), String> {
+    fn take(&mut self, known: &Known, channels: Option<[&'a Channel; 3]>) -> Checked {
         let Some(channels) = channels else {
             if !known.is_tallow_s_own() && known.aov != Aov::ShareOfSamples {
                 self.notes.push(format!("{}: not there", known.label));

@@ -1,6 +1,7 @@
 //! The memory that decoding a file takes, computed from its headers. It is checked before anything is allocated, because a
 //! header of a few bytes can claim any size.
 use super::frame::{self, Frame};
+use crate::error::Checked;
 use exr::meta::MetaData;
 use exr::meta::attribute::{IntegerBounds, SampleType};
 use exr::meta::header::Header;
@@ -37,7 +38,7 @@ const EMPTY_TIMES: u64 = 4;
 ///
 /// # Errors
 /// A message about the size that is not possible.
-pub(super) fn of_exr(meta: &MetaData, behind: usize, kind: Frame) -> Result<Claim, String> {
+pub(super) fn of_exr(meta: &MetaData, behind: usize, kind: Frame) -> Checked<Claim> {
     check_data(&meta.headers, behind as u64)?;
     let frame = frame::of(meta, kind);
     check_frame(&meta.headers, frame)?;
@@ -54,7 +55,7 @@ pub(super) fn of_exr(meta: &MetaData, behind: usize, kind: Frame) -> Result<Clai
 }
 
 /// Checks that the claimed pixels and chunks fit into the bytes that follow the headers.
-fn check_data(headers: &[Header], behind: u64) -> Result<(), String> {
+fn check_data(headers: &[Header], behind: u64) -> Checked {
     let sum = |of: fn(&Header) -> u64| headers.iter().map(of).fold(0, u64::saturating_add);
     let least = sum(|h| bytes_of_pixels(h) / largest_ratio(h.compression))
         .saturating_add(sum(|h| (h.chunk_count as u64).saturating_mul(BYTES_OF_CHUNK)));
@@ -86,7 +87,7 @@ fn largest_ratio(compression: Compression) -> u64 {
     }
 }
 
-fn check_frame(headers: &[Header], frame: IntegerBounds) -> Result<(), String> {
+fn check_frame(headers: &[Header], frame: IntegerBounds) -> Checked {
     let stored: u64 = headers.iter().map(|h| area(frame::window(h))).sum();
     let samples: u64 = headers.iter().map(|h| area(frame::window(h)) * h.channels.list.len() as u64).sum();
     let (pixels, all) = (area(frame), area(frame).saturating_mul(channels(headers)));

@@ -5,6 +5,7 @@ use super::frame::{self, Frame, held, shown, union};
 use super::output::Stream;
 use super::primaries::{from_exr, to_exr};
 use super::sorted_head::SortedHead;
+use crate::error::Checked;
 use crate::memory;
 use exr::block::lines::LineRefMut;
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
@@ -95,7 +96,7 @@ impl SamplesWriter for Lines<'_> {
 }
 
 /// The memory that decoding takes, from the headers alone.
-pub(super) fn claim(bytes: &[u8], frame: Frame) -> Result<Claim, String> {
+pub(super) fn claim(bytes: &[u8], frame: Frame) -> Checked<Claim> {
     let mut stream = Cursor::new(bytes);
     let meta = MetaData::read_from_buffered(&mut stream, true).map_err(plain)?;
     MetaData::validate(&meta.headers, false).map_err(plain)?;
@@ -104,7 +105,7 @@ pub(super) fn claim(bytes: &[u8], frame: Frame) -> Result<Claim, String> {
 }
 
 /// What the headers alone tell of the film of [`Frame::Display`]: its channels have no samples.
-pub(super) fn head(bytes: &[u8]) -> Result<Film, String> {
+pub(super) fn head(bytes: &[u8]) -> Checked<Film> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(plain)?;
     let frame = frame::of(&meta, Frame::Display);
     let mut film = Film::new(frame.size.0 as u32, frame.size.1 as u32);
@@ -123,13 +124,13 @@ pub(super) fn head(bytes: &[u8]) -> Result<Film, String> {
 }
 
 /// The rectangles of [`Frame::Data`] and [`Frame::Display`], from the headers alone.
-pub(super) fn frames(bytes: &[u8]) -> Result<[IntegerBounds; 2], String> {
+pub(super) fn frames(bytes: &[u8]) -> Checked<[IntegerBounds; 2]> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(plain)?;
     Ok([Frame::Data, Frame::Display].map(|frame| frame::of(&meta, frame)))
 }
 
 /// The film of [`Frame::Display`]. It must be called only after [`claim`] has accepted the headers.
-pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
+pub(super) fn decode(bytes: &[u8]) -> Checked<Film> {
     let mut image = read(bytes)?;
     let window = image.attributes.display_window;
     film_from(&mut image, window, false)
@@ -137,7 +138,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
 
 /// The film of [`Frame::Data`], and the file without the samples that the film holds as they were stored: [`replace`] takes both. It must
 /// be called only after [`claim`] has accepted the headers.
-pub(super) fn decode_parts(bytes: &[u8]) -> Result<(Film, FlatImage), String> {
+pub(super) fn decode_parts(bytes: &[u8]) -> Checked<(Film, FlatImage)> {
     let mut image = read(bytes)?;
     let window = stored(&image);
     Ok((film_from(&mut image, window, true)?, image))
@@ -154,7 +155,7 @@ pub(super) struct Replacement<'a> {
 
 /// Encodes what [`decode_parts`] has made of a file with new samples. Everything else is kept except the compression, which becomes
 /// lossless.
-pub(super) fn replace(parts: &FlatImage, film: &Film, with: &Replacement) -> Result<Vec<u8>, String> {
+pub(super) fn replace(parts: &FlatImage, film: &Film, with: &Replacement) -> Checked<Vec<u8>> {
     let mut image = whole(parts, film);
     set_entry(&mut image, with.entry);
     let frame = stored(&image);
@@ -224,7 +225,7 @@ fn stored(image: &FlatImage) -> IntegerBounds {
     windows.reduce(union).unwrap_or(image.attributes.display_window)
 }
 
-fn read(bytes: &[u8]) -> Result<FlatImage, String> {
+fn read(bytes: &[u8]) -> Checked<FlatImage> {
     let chunks = exr::block::read(Cursor::new(bytes), false).map_err(plain)?;
     exr::prelude::read()
         .no_deep_data()
@@ -259,7 +260,7 @@ fn damaged(what: &str) -> String {
 }
 
 /// Refuses subsampled channels, on which the crate's reader would panic.
-fn check_sampling(meta: &MetaData) -> Result<(), String> {
+fn check_sampling(meta: &MetaData) -> Checked {
     let mut channels = meta.headers.iter().flat_map(|h| &h.channels.list);
     match channels.find(|c| c.sampling != Vec2(1, 1)) {
         Some(c) => Err(format!("channel {} is subsampled, which is not supported: save it at full size", c.name)),
@@ -269,7 +270,7 @@ fn check_sampling(meta: &MetaData) -> Result<(), String> {
 
 /// Puts all parts into one film. If there are several, the channel names begin with the name of the part. Samples that the film
 /// cannot hold as they are stored remain in the image if it `keeps` them.
-fn film_from(image: &mut FlatImage, frame: IntegerBounds, keeps: bool) -> Result<Film, String> {
+fn film_from(image: &mut FlatImage, frame: IntegerBounds, keeps: bool) -> Checked<Film> {
     let mut film = Film::new(frame.size.0 as u32, frame.size.1 as u32);
     if film.pixels() == 0 {
         return Err("has no pixels: its display window is empty".to_owned());
@@ -312,7 +313,7 @@ fn channel_name(part: Option<&str>, channel: &str) -> String {
 }
 
 /// The samples are taken where they need no conversion.
-fn shown_samples(samples: &mut FlatSamples, data: IntegerBounds, frame: IntegerBounds) -> Result<Samples, String> {
+fn shown_samples(samples: &mut FlatSamples, data: IntegerBounds, frame: IntegerBounds) -> Checked<Samples> {
     use std::mem::take;
     Ok(match samples {
         FlatSamples::F16(v) => {

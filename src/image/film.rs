@@ -1,6 +1,7 @@
 //! The film, which is the result of a render and the content of an image file: planes of samples with dotted names, as in
 //! EXR files.
 use super::primaries::{self, Primaries};
+use crate::error::Checked;
 use crate::{memory, threads};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -93,7 +94,7 @@ impl Picture {
     ///
     /// # Errors
     /// How many pixels have a NaN or an infinity.
-    pub fn finite(self) -> Result<Self, String> {
+    pub fn finite(self) -> Checked<Self> {
         match self.non_finite() {
             0 => Ok(self),
             n => Err(format!("{n} of {} pixels are NaN or infinite, which no metric can weigh", self.pixels.len())),
@@ -192,7 +193,7 @@ impl Film {
     ///
     /// # Errors
     /// When there is no such layer or more than one, with a list of all channels, or when memory is out.
-    pub fn picture(&self, layer: Option<&str>) -> Result<Picture, String> {
+    pub fn picture(&self, layer: Option<&str>) -> Checked<Picture> {
         let channels = self.find(layer).ok_or_else(|| self.no_such_layer(layer))?;
         let [a, b, c] = channels.map(|c| c.samples.to_f32());
         let mut pixels = memory::reserved(self.pixels())?;
@@ -205,7 +206,7 @@ impl Film {
     ///
     /// # Errors
     /// As [`Film::picture`].
-    pub fn rec709(&self, layer: Option<&str>) -> Result<Picture, String> {
+    pub fn rec709(&self, layer: Option<&str>) -> Checked<Picture> {
         self.picture(layer).map(|picture| self.as_rec709(picture))
     }
 

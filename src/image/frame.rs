@@ -1,6 +1,7 @@
 //! The pixels of an EXR file that make up a film. The parts of a file can cover different rectangles (data windows), and
 //! the display window is the rectangle that is shown.
 use super::film::Window;
+use crate::error::Checked;
 use crate::memory;
 use exr::meta::MetaData;
 use exr::meta::attribute::IntegerBounds;
@@ -62,11 +63,7 @@ pub(super) fn part(window: Window, frame: IntegerBounds) -> IntegerBounds {
 
 /// Copies samples from the rectangle `data` into the rectangle `window`. Pixels outside `data` are 0, and samples outside
 /// `window` are dropped.
-pub(super) fn shown<T: Copy + Default>(
-    stored: &[T],
-    data: IntegerBounds,
-    window: IntegerBounds,
-) -> Result<Vec<T>, String> {
+pub(super) fn shown<T: Copy + Default>(stored: &[T], data: IntegerBounds, window: IntegerBounds) -> Checked<Vec<T>> {
     let (width, height) = (window.size.0, window.size.1);
     let mut out = memory::reserved(width * height)?;
     out.resize(width * height, T::default());

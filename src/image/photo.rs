@@ -3,6 +3,7 @@ use super::WriteOptions;
 use super::claim::Claim;
 use super::film::{Film, Picture, Samples};
 use super::tone;
+use crate::error::Checked;
 use crate::math::srgb::linear_from_srgb;
 use crate::memory;
 use image::codecs::{
@@ -34,7 +35,7 @@ pub fn codes(picture: &Picture, options: &WriteOptions) -> Vec<u8> {
 ///
 /// # Errors
 /// When the picture has no pixels.
-pub fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, String> {
+pub fn encode_png(picture: &Picture, options: &WriteOptions) -> Checked<Vec<u8>> {
     let mut out = Vec::new();
     PngEncoder::new(&mut out)
         .write_image(&codes(picture, options), picture.width, picture.height, ExtendedColorType::Rgb8)
@@ -51,7 +52,7 @@ const SRGB: [u8; 13] = *b"\0\0\0\x01sRGB\0\xae\xce\x1c\xe9";
 /// Encodes RGBE, which has no sign and no infinities: negative values and NaN become 0, values are limited to the largest that it
 /// holds, and pixels below its smallest exponent become black (the encoder would let that wrap around). All others are rounded here,
 /// since the encoder cuts off.
-pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
+pub(super) fn encode_hdr(picture: &Picture) -> Checked<Vec<u8>> {
     // The encoder marks rows of this width by a byte that every reader takes for a pixel.
     if picture.width == 32768 {
         return Err("is 32768 pixels wide, which HDR files cannot be: write an .exr".to_owned());
@@ -88,7 +89,7 @@ const RGBE: &[u8] = b"#?RGBE\n";
 ///
 /// # Errors
 /// A message about what is wrong with the header.
-pub fn claim(bytes: &[u8]) -> Result<Claim, String> {
+pub fn claim(bytes: &[u8]) -> Checked<Claim> {
     if format(bytes).is_none() {
         return Err(NO_IMAGE.to_owned());
     }
@@ -104,7 +105,7 @@ pub fn claim(bytes: &[u8]) -> Result<Claim, String> {
     Ok(Claim { size: [width, height], bytes: pixels * (u64::from(color.bytes_per_pixel()) + 4 * planes) })
 }
 
-pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
+pub(super) fn decode(bytes: &[u8]) -> Checked<Film> {
     film_from(&picture(bytes)?)
 }
 
@@ -113,7 +114,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
 ///
 /// # Errors
 /// A message about what is wrong with the data, or that they need more memory than is free.
-pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
+pub fn picture(bytes: &[u8]) -> Checked<DynamicImage> {
     let claim = claim(bytes)?;
     check_end(bytes)?;
     memory::check(claim.bytes)?;
@@ -126,7 +127,7 @@ pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
 }
 
 /// What the radiance in an HDR file was multiplied by, all lines together; `None` for other files.
-fn exposure(bytes: &[u8]) -> Result<Option<[f32; 3]>, String> {
+fn exposure(bytes: &[u8]) -> Checked<Option<[f32; 3]>> {
     if format(bytes) != Some(ImageFormat::Hdr) {
         return Ok(None);
     }
@@ -188,7 +189,7 @@ pub fn has_16_bits(bytes: &[u8]) -> bool {
     format(bytes) == Some(ImageFormat::Png) && bytes.get(24) == Some(&16)
 }
 
-fn reader(bytes: &[u8], memory: u64) -> Result<ImageReader<Cursor<Cow<'_, [u8]>>>, String> {
+fn reader(bytes: &[u8], memory: u64) -> Checked<ImageReader<Cursor<Cow<'_, [u8]>>>> {
     let bytes = match bytes.strip_prefix(RGBE) {
         Some(rest) => Cow::Owned([RADIANCE, rest].concat()),
         None => Cow::Borrowed(bytes),
@@ -219,7 +220,7 @@ fn plain(e: ImageError) -> String {
 ///
 /// # Errors
 /// A message that the end of the file is missing.
-pub fn check_end(bytes: &[u8]) -> Result<(), String> {
+pub fn check_end(bytes: &[u8]) -> Checked {
     match format(bytes) == Some(ImageFormat::Jpeg) && jpeg_is_cut(bytes) {
         true => Err("is a JPEG without its end: get the complete file".to_owned()),
         false => Ok(()),
@@ -259,7 +260,7 @@ pub fn bands(image: &DynamicImage) -> impl Iterator<Item = DynamicImage> {
 
 /// Converts a picture into a film. Integers are sRGB code values and floats are radiance. Alpha is always linear and
 /// becomes the channel A.
-fn film_from(image: &DynamicImage) -> Result<Film, String> {
+fn film_from(image: &DynamicImage) -> Checked<Film> {
     let is_float = matches!(image.color(), ColorType::Rgb32F | ColorType::Rgba32F);
     let names = if image.color().has_alpha() { &["R", "G", "B", "A"][..] } else { &["R", "G", "B"] };
     let mut film = Film::new(image.width(), image.height());

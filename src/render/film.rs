@@ -1,5 +1,5 @@
 //! What a renderer's buffers hold, as the channels of an image file, and back.
-use crate::error::Result;
+use crate::error::{Checked, Result};
 use crate::gpu::Buffer;
 use crate::image::{FILTERED, Film, NOISY, Samples};
 use crate::layout::{Guide, PixelLight, PixelStats, vec3};
@@ -170,7 +170,7 @@ fn drop_remainders_of_none(film: &mut Film) {
 ///
 /// # Errors
 /// Which layer is missing, or that memory is.
-pub(crate) fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
+pub(crate) fn pixels(film: &Film) -> Checked<Vec<Pixel>> {
     let mean = match (rgb(film, NOISY), film.metadata.get(FILTERED)) {
         (Ok(mean), _) => mean,
         (Err(_), None) => rgb(film, "")?,
@@ -213,7 +213,7 @@ pub(crate) fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
 ///
 /// # Errors
 /// When it has a part of what that takes.
-pub(crate) fn splits_light(film: &Film) -> std::result::Result<bool, String> {
+pub(crate) fn splits_light(film: &Film) -> Checked<bool> {
     let names = ["direct", "indirect"].map(|layer| RGB.map(|c| format!("{layer}.{c}"))).concat();
     match names.iter().filter(|name| film.channel(name).is_some()).count() {
         0 => Ok(false),
@@ -223,7 +223,7 @@ pub(crate) fn splits_light(film: &Film) -> std::result::Result<bool, String> {
 }
 
 /// The channels of a layer.
-fn rgb<'a>(film: &'a Film, layer: &str) -> std::result::Result<[&'a [f32]; 3], String> {
+fn rgb<'a>(film: &'a Film, layer: &str) -> Checked<[&'a [f32]; 3]> {
     let plane = |component: &str| {
         let name = if layer.is_empty() { component.to_owned() } else { format!("{layer}.{component}") };
         floats(film, &name)
@@ -234,7 +234,7 @@ fn rgb<'a>(film: &'a Film, layer: &str) -> std::result::Result<[&'a [f32]; 3], S
 /// Direct light, the albedo of all other light and its M2, where they are kept apart.
 type Light<'a> = ([&'a [f32]; 3], [&'a [f32]; 3], &'a [f32]);
 
-fn light(film: &Film) -> std::result::Result<Option<Light<'_>>, String> {
+fn light(film: &Film) -> Checked<Option<Light<'_>>> {
     if !splits_light(film)? {
         return Ok(None);
     }
@@ -251,7 +251,7 @@ fn light(film: &Film) -> std::result::Result<Option<Light<'_>>, String> {
 ///
 /// # Errors
 /// When it is damaged.
-pub(crate) fn broken_samples(film: &Film) -> std::result::Result<Option<BrokenSamples>, String> {
+pub(crate) fn broken_samples(film: &Film) -> Checked<Option<BrokenSamples>> {
     let said = film.metadata.get(BROKEN);
     said.map(|text| serde_json::from_str(text).map_err(|e| format!("{BROKEN}: {e}"))).transpose()
 }
@@ -296,7 +296,7 @@ pub fn replace_colour(film: &mut Film, colour: [Vec<f32>; 3], filter: &str) {
 ///
 /// # Errors
 /// When there is no such channel.
-pub(crate) fn floats<'a>(film: &'a Film, name: &str) -> std::result::Result<&'a [f32], String> {
+pub(crate) fn floats<'a>(film: &'a Film, name: &str) -> Checked<&'a [f32]> {
     film.floats(name).ok_or_else(|| lacks("channel of floats", name))
 }
 
@@ -304,7 +304,7 @@ pub(crate) fn floats<'a>(film: &'a Film, name: &str) -> std::result::Result<&'a 
 ///
 /// # Errors
 /// When there is no such layer of integers.
-pub(crate) fn counts<'a>(film: &'a Film, name: &str) -> std::result::Result<&'a [u32], String> {
+pub(crate) fn counts<'a>(film: &'a Film, name: &str) -> Checked<&'a [u32]> {
     film.words(name).ok_or_else(|| lacks("layer of counts", name))
 }
 

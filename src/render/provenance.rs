@@ -1,6 +1,6 @@
 //! What the metadata of a rendered file say of where its samples come from: by that it is resumed and merged.
 use super::{Renderer, film};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::image::Film;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -59,7 +59,7 @@ impl Provenance {
     ///
     /// # Errors
     /// What is missing or damaged.
-    pub(crate) fn of(film: &Film) -> std::result::Result<Self, String> {
+    pub(crate) fn of(film: &Film) -> Checked<Self> {
         if film.metadata.contains_key(HISTORY) {
             return Err("has samples of earlier frames: it can be neither resumed nor merged".to_owned());
         }
@@ -75,7 +75,7 @@ impl Provenance {
 
     /// # Errors
     /// When the film is of another scene.
-    pub(crate) fn shows(&self, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
+    pub(crate) fn shows(&self, scene: &Scene, settings: &Settings) -> Checked {
         let shown = scene.fingerprint(settings.size()).map_err(|e| e.to_string())?;
         if self.scene == shown.to_string() {
             return Ok(());
@@ -84,7 +84,7 @@ impl Provenance {
     }
 }
 
-fn check_ranges(samples: &[SampleRange]) -> std::result::Result<(), String> {
+fn check_ranges(samples: &[SampleRange]) -> Checked {
     let wrong = |what: &str| Err(format!("{SAMPLES} {what}: take the file as tallow wrote it"));
     if samples.is_empty() {
         return Err("holds no samples yet: render anew".to_owned());
@@ -103,12 +103,12 @@ fn check_ranges(samples: &[SampleRange]) -> std::result::Result<(), String> {
     Ok(())
 }
 
-fn said<'a>(film: &'a Film, key: &str) -> std::result::Result<&'a str, String> {
+fn said<'a>(film: &'a Film, key: &str) -> Checked<&'a str> {
     let missing = || format!("has no metadata \"{key}\": it must be of tallow render or merge, of this version");
     film.metadata.get(key).map(String::as_str).ok_or_else(missing)
 }
 
-fn parsed<T: DeserializeOwned>(film: &Film, key: &str) -> std::result::Result<T, String> {
+fn parsed<T: DeserializeOwned>(film: &Film, key: &str) -> Checked<T> {
     serde_json::from_str(said(film, key)?).map_err(|e| format!("{key}: {e}"))
 }
 

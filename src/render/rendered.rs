@@ -2,6 +2,7 @@
 //! trusts them from here on.
 use super::film;
 use super::provenance::Provenance;
+use crate::error::Checked;
 use crate::image::Film;
 use crate::render::schedule;
 use crate::render::settings::{Placing, Settings};
@@ -23,7 +24,7 @@ impl Head {
     ///
     /// # Errors
     /// What is missing or damaged.
-    pub(crate) fn of(film: &Film) -> Result<Self, String> {
+    pub(crate) fn of(film: &Film) -> Checked<Self> {
         let provenance = Provenance::of(film)?;
         let settings = Settings::deserialize(&provenance.settings).map_err(|e| format!("settings: {e}"))?;
         settings.validate().map_err(|e| format!("settings: {e}"))?;
@@ -51,7 +52,7 @@ impl Rendered {
     ///
     /// # Errors
     /// What is missing, damaged, or not as the metadata say.
-    pub(crate) fn of(film: &Film) -> Result<Self, String> {
+    pub(crate) fn of(film: &Film) -> Checked<Self> {
         let Head { provenance, settings, .. } = Head::of(film)?;
         let pixels = film::pixels(film)?;
         check_pixels(&pixels, settings.width, provenance.samples_per_pixel())?;
@@ -74,7 +75,7 @@ impl Rendered {
     ///
     /// # Errors
     /// When they are missing.
-    pub(crate) fn priority(&self, film: &Film) -> Result<Vec<f32>, String> {
+    pub(crate) fn priority(&self, film: &Film) -> Checked<Vec<f32>> {
         if self.settings.allocate.is_even() {
             return Ok(Vec::new());
         }
@@ -82,7 +83,7 @@ impl Rendered {
     }
 }
 
-fn check_size(film: &Film, settings: &Settings) -> Result<(), String> {
+fn check_size(film: &Film, settings: &Settings) -> Checked {
     let is_cut = film.channels.iter().any(|c| c.window.is_some());
     if film.size() != settings.size() || is_cut {
         let [width, height] = settings.size();
@@ -92,7 +93,7 @@ fn check_size(film: &Film, settings: &Settings) -> Result<(), String> {
     Ok(())
 }
 
-fn check_pixels(pixels: &[Pixel], width: u32, most: u32) -> Result<(), String> {
+fn check_pixels(pixels: &[Pixel], width: u32, most: u32) -> Checked {
     for (i, pixel) in pixels.iter().enumerate() {
         let count = pixel.stats.count;
         if count > most {
@@ -107,7 +108,7 @@ fn check_pixels(pixels: &[Pixel], width: u32, most: u32) -> Result<(), String> {
 ///
 /// # Errors
 /// A sentence that names the first pixel.
-pub(super) fn check_values(pixels: &[Pixel], width: u32) -> Result<(), String> {
+pub(super) fn check_values(pixels: &[Pixel], width: u32) -> Checked {
     let found = pixels.iter().enumerate().find_map(|(i, pixel)| Some((i as u32, broken(pixel)?)));
     found.map_or(Ok(()), |(i, (layer, value))| {
         let (x, y) = (i % width, i / width);
@@ -132,7 +133,7 @@ fn broken(pixel: &Pixel) -> Option<(&'static str, f32)> {
 }
 
 /// What pixels lack is part of what the settings give them.
-fn check_pending(pending: &[u32], pixels: &[Pixel], settings: &Settings) -> Result<(), String> {
+fn check_pending(pending: &[u32], pixels: &[Pixel], settings: &Settings) -> Checked {
     let with_pending = |(&lacks, pixel): (&u32, &Pixel)| u64::from(lacks) + u64::from(pixel.stats.count);
     let most = u64::from(most_of_pixel(settings));
     let sums = || pending.iter().zip(pixels).map(with_pending);

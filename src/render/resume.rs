@@ -2,7 +2,7 @@
 use super::provenance;
 use super::rendered::Rendered;
 use super::{PathRange, Progress, Renderer, Step, film};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::gpu::FrameResources;
 use crate::image::{self, FILTERED, Film};
 use crate::render::schedule;
@@ -58,7 +58,7 @@ impl Checkpoint {
         (counts.clone().min().unwrap_or(0), counts.max().unwrap_or(0))
     }
 
-    fn of(film: &Film, scene: &Scene, settings: &Settings) -> std::result::Result<Self, String> {
+    fn of(film: &Film, scene: &Scene, settings: &Settings) -> Checked<Self> {
         let rendered = Rendered::of(film)?;
         check(&rendered, scene, settings)?;
         let priority = rendered.priority(film)?;
@@ -157,7 +157,7 @@ pub fn is_frame(film: &Film, scene: &Scene, settings: &Settings, history: &str) 
 }
 
 /// Whether a render of this scene can go on where the file's ended.
-fn check(rendered: &Rendered, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
+fn check(rendered: &Rendered, scene: &Scene, settings: &Settings) -> Checked {
     let (Rendered { provenance, settings: former, .. }, uniform) = (rendered, settings.allocate.is_even());
     let mut wanted = provenance::values(settings).map_err(|e| e.to_string())?;
     let mut had = provenance.settings.clone();
@@ -182,7 +182,7 @@ fn check(rendered: &Rendered, scene: &Scene, settings: &Settings) -> std::result
 }
 
 /// Allocations that the render had made.
-fn allocations(film: &Film) -> std::result::Result<u32, String> {
+fn allocations(film: &Film) -> Checked<u32> {
     // Each adds a sample to some pixel, but for those behind a threshold, which may find nothing to add.
     const MOST: u32 = Settings::MAX_SPP + u32::BITS;
     let made = film.metadata.get(ALLOCATIONS).and_then(|n| n.parse().ok());

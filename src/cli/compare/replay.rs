@@ -3,6 +3,7 @@ use super::report;
 use crate::cli::choices::Choices;
 use crate::cli::quoted;
 use crate::cli::render::FRAME;
+use crate::error::Checked;
 use crate::image::Film;
 use crate::render::provenance::{Provenance, SampleRange};
 use crate::render::settings::Settings;
@@ -12,7 +13,7 @@ use serde_json::Value;
 ///
 /// # Errors
 /// What the file does not tell.
-pub fn commands(film: &Film, [x, y]: [u32; 2], stem: &str) -> Result<Vec<String>, String> {
+pub fn commands(film: &Film, [x, y]: [u32; 2], stem: &str) -> Checked<Vec<String>> {
     let scene = film.metadata.get("scene").ok_or("its metadata do not name the scene")?;
     if let Some(frame) = film.metadata.get(FRAME) {
         return Err(format!(

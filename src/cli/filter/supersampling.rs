@@ -2,7 +2,7 @@
 use crate::cli::choices::Choices;
 use crate::cli::render::FRAME;
 use crate::denoise::Filtered;
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::vec3;
@@ -59,7 +59,7 @@ impl Supersampling {
 }
 
 /// The settings of the render, without those of sample allocation.
-fn settings(aovs: &Aovs, provenance: &Provenance) -> std::result::Result<Settings, String> {
+fn settings(aovs: &Aovs, provenance: &Provenance) -> Checked<Settings> {
     aovs.get(Aov::Direct).ok_or("has no direct light: --scene needs an .exr file of tallow render")?;
     let settings = Settings::deserialize(&provenance.settings).map_err(|e| format!("settings: {e}"))?;
     if settings.size() != aovs.film.size() {

@@ -3,7 +3,7 @@ use super::{Args, check_room};
 use crate::cli::files::Item;
 use crate::cost::grid;
 use crate::denoise::filter::Method;
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::gpu::{Gpu, milliseconds};
 use crate::image::input;
 use crate::plan::{self, Plan, Target};
@@ -16,7 +16,7 @@ use std::time::Duration;
 const BYTES_OF_JSON: u64 = 64;
 
 /// Parses a time such as `200ms`, `2s` or `1m 30s`.
-pub fn duration(text: &str) -> std::result::Result<Duration, String> {
+pub fn duration(text: &str) -> Checked<Duration> {
     match humantime::parse_duration(text) {
         Ok(time) if !time.is_zero() => Ok(time),
         _ => Err("expected a time above 0 with its unit, such as 200ms, 2s or \"1m 30s\"".to_owned()),

@@ -1,6 +1,6 @@
 //! `--preview`: the frames of a sequence as a small animated picture.
 use crate::cli::files::{Files, Item};
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::image::{self, Film, WriteOptions, output};
 use ::image::codecs::gif::{GifEncoder, Repeat};
 use ::image::imageops::dither;
@@ -41,7 +41,7 @@ impl Preview {
     ///
     /// # Errors
     /// A sentence about a film that is no picture.
-    pub fn add(&mut self, film: &Film, options: &WriteOptions) -> std::result::Result<(), String> {
+    pub fn add(&mut self, film: &Film, options: &WriteOptions) -> Checked {
         let picture = film.rec709(None)?;
         let whole = RgbImage::from_raw(picture.width, picture.height, image::codes(&picture, options));
         let whole = DynamicImage::from(whole.ok_or("holds no code for each pixel")?);

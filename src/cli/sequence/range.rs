@@ -1,8 +1,9 @@
 //! Ranges of frames on the command line.
+use crate::error::Checked;
 use std::ops::Range;
 
 /// `0..96` without the end, `0..=95` with it, or one number.
-pub fn parse(text: &str) -> Result<Range<u32>, String> {
+pub fn parse(text: &str) -> Checked<Range<u32>> {
     let number = |text: &str| text.trim().parse::<u32>().ok();
     let found = match (text.split_once("..="), text.split_once("..")) {
         (Some((first, last)), _) => number(first).zip(number(last).and_then(|last| last.checked_add(1))),

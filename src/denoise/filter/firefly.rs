@@ -3,7 +3,7 @@
 use super::pixel::known_radiance;
 use super::{FilterInput, Planes};
 use crate::denoise::windows;
-use crate::error::{Error, Result};
+use crate::error::{Checked, Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, Recorder};
 use crate::layout::{FireflyPush, vec3, vec4};
 use crate::math::srgb::luminance;
@@ -44,7 +44,7 @@ impl Fireflies {
 impl FromStr for Fireflies {
     type Err = String;
 
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
+    fn from_str(text: &str) -> Checked<Self> {
         match text.parse() {
             _ if text == "off" => Ok(Self::Off),
             Ok(factor) if factor >= 1.0 => Ok(Self::Above(factor)),

@@ -1,4 +1,5 @@
 //! What a file says of an image's expectation: means, and how far they may be off.
+use crate::error::Checked;
 use crate::image::aov::{Aovs, Names};
 use crate::image::{FILTERED, Film, Picture};
 
@@ -36,7 +37,7 @@ impl Estimate {
     ///
     /// # Errors
     /// What is missing.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Checked {
         let pixels = self.width as usize * self.height as usize;
         let objects = self.objects.as_ref().map_or(pixels, Vec::len);
         let (squares, counts) = match &self.noise {
@@ -73,7 +74,7 @@ impl Estimate {
     ///
     /// # Errors
     /// When the film has no noise, or is filtered and has only the filtered colour, or a value is not finite.
-    pub fn of_film(film: &Film) -> Result<Self, String> {
+    pub fn of_film(film: &Film) -> Checked<Self> {
         let mean = mean(film)?;
         let aovs = Aovs::find(film, &Names::new())?;
         let pixels = 0..film.pixels();
@@ -104,7 +105,7 @@ impl Estimate {
     ///
     /// # Errors
     /// When sizes differ, or a value is not finite or a standard error negative.
-    pub fn with_errors(film: &Film, errors: &Picture) -> Result<Self, String> {
+    pub fn with_errors(film: &Film, errors: &Picture) -> Checked<Self> {
         if film.size() != errors.size() {
             return Err(format!("the standard errors are {}x{}, its image is not", errors.width, errors.height));
         }
@@ -115,7 +116,7 @@ impl Estimate {
         Self { width: film.width, height: film.height, mean: mean(film)?, noise, objects: None }.checked()
     }
 
-    fn checked(self) -> Result<Self, String> {
+    fn checked(self) -> Checked<Self> {
         self.check()?;
         match &self.noise {
             Noise::Samples { count, .. } if count.iter().all(|n| *n < 2.0) => Err(
@@ -129,7 +130,7 @@ impl Estimate {
 }
 
 /// The colour, or what it was before it was filtered.
-fn mean(film: &Film) -> Result<Vec<[f32; 3]>, String> {
+fn mean(film: &Film) -> Checked<Vec<[f32; 3]>> {
     let noisy = film.picture(Some(crate::image::NOISY));
     if let (Err(_), Some(filter)) = (&noisy, film.metadata.get(FILTERED)) {
         return Err(format!(

@@ -45,6 +45,7 @@ mod judge;
 mod map;
 mod region;
 
+use crate::error::Checked;
 pub use estimate::{Estimate, Noise};
 pub use map::{Overlay, overlay};
 pub use region::{Scale, Where};
@@ -171,7 +172,7 @@ impl Outcome {
 /// # Errors
 /// When the sizes differ, an option is out of range, too few pixels have two samples, or [`Options::at`] is a scale at which
 /// nothing can be judged, in one line that says what to do.
-pub fn test(a: &Estimate, b: &Estimate, options: &Options) -> Result<Outcome, String> {
+pub fn test(a: &Estimate, b: &Estimate, options: &Options) -> Checked<Outcome> {
     check(a, b, options)?;
     let judge = judge::Judge::new(a, b, options);
     let left_out = a.mean.len() - judge.usable();
@@ -213,7 +214,7 @@ pub fn suspects(a: &Estimate, b: &Estimate, outcome: &Outcome) -> Vec<Finding> {
     judge::Judge::new(a, b, &Options::default()).suspects(outcome)
 }
 
-fn check(a: &Estimate, b: &Estimate, options: &Options) -> Result<(), String> {
+fn check(a: &Estimate, b: &Estimate, options: &Options) -> Checked {
     if (a.width, a.height) != (b.width, b.height) {
         return Err(format!(
             "images of {}x{} and {}x{}: compare images of one size",

@@ -1,5 +1,6 @@
 //! The regions of an image at one scale. Regions of a scale share no pixel.
 use super::{Estimate, MIN_PIXELS};
+use crate::error::Checked;
 use crate::layout::NONE;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -33,7 +34,7 @@ impl Display for Scale {
 impl FromStr for Scale {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Checked<Self> {
         let block = |edge: u32| Self::Block(edge);
         match text {
             "pixel" => Ok(Self::Pixel),

@@ -1,4 +1,5 @@
 //! Pixels as text inside a page: half floats for the viewer, and PNG for readers without scripts.
+use crate::error::Checked;
 use crate::image::{Picture, WriteOptions, encode_png};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -43,7 +44,7 @@ pub fn length_of_halves(picture: &Picture) -> usize {
 ///
 /// # Errors
 /// When the picture has no pixels.
-pub fn png(picture: &Picture) -> Result<String, String> {
+pub fn png(picture: &Picture) -> Checked<String> {
     Ok(STANDARD.encode(encode_png(picture, &WriteOptions::default())?))
 }
 

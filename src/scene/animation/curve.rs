@@ -1,5 +1,6 @@
 //! Numbers that change with time.
 use super::time::{reaches, within};
+use crate::error::Checked;
 use crate::scene::description::Interpolation;
 use glam::DQuat;
 
@@ -20,7 +21,7 @@ impl Curve {
     ///
     /// # Errors
     /// A sentence about times that do not grow, and numbers that are none.
-    pub fn new(keys: Vec<(f64, Vec<f64>)>, interpolation: Interpolation, turns: bool) -> Result<Self, String> {
+    pub fn new(keys: Vec<(f64, Vec<f64>)>, interpolation: Interpolation, turns: bool) -> Checked<Self> {
         for (number, (time, value)) in (1..).zip(&keys) {
             if !time.is_finite() || !value.iter().all(|v| v.is_finite()) {
                 return Err(format!("key {number}, at {time}, has a number that is NaN or infinite"));
@@ -73,7 +74,7 @@ impl Curve {
 mod tests {
     use super::*;
 
-    fn curve(keys: &[(f64, f64)], interpolation: Interpolation) -> Result<Curve, String> {
+    fn curve(keys: &[(f64, f64)], interpolation: Interpolation) -> Checked<Curve> {
         Curve::new(keys.iter().map(|&(t, v)| (t, vec![v])).collect(), interpolation, false)
     }
 

@@ -1,4 +1,5 @@
 //! New numbers of a material, with the ranges that its table has.
+use crate::error::Checked;
 use crate::layout::{BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_MASKED, MATERIAL_UNLIT, Material};
 use crate::scene::load::material::{is_masked, mark_clear_wall, radiance, reflectance, within};
 use crate::scene::load::metallic::reflected_head_on;
@@ -8,7 +9,7 @@ use crate::scene::pose::MaterialChange;
 ///
 /// # Errors
 /// A sentence that names the number at fault.
-pub fn changed(m: &Material, to: &MaterialChange) -> Result<Material, String> {
+pub fn changed(m: &Material, to: &MaterialChange) -> Checked<Material> {
     let tint = |value: [f32; 3], what: &str| reflectance(value, what, &mut Vec::new());
     let mut m = *m;
     if let Some(color) = to.color {

@@ -2,6 +2,7 @@
 use super::attributes::{Extras, corners, words_of};
 use super::bvh;
 use super::geometry::{Corners, FLAT, Geometry, Placement, Repairs, Tag, TooFar};
+use crate::error::Checked;
 use crate::layout::{ATTRIBUTE_TANGENTS, BvhNode, NONE, Shading, Triangle};
 use crate::scene::MAX_COORDINATE;
 use crate::scene::pose::Vertices;
@@ -62,7 +63,7 @@ impl Soft {
     ///
     /// # Errors
     /// A sentence about what does not fit.
-    pub fn place(&self, to: &Vertices, before: &[Triangle]) -> Result<Placed, String> {
+    pub fn place(&self, to: &Vertices, before: &[Triangle]) -> Checked<Placed> {
         let indices = if to.indices.is_empty() { &self.indices } else { &to.indices };
         self.check(to, indices)?;
         let place = |part: &[u32]| self.place_part(to, indices, part);
@@ -75,7 +76,7 @@ impl Soft {
         Ok(placed)
     }
 
-    fn check(&self, to: &Vertices, indices: &[u32]) -> Result<(), String> {
+    fn check(&self, to: &Vertices, indices: &[u32]) -> Checked {
         let (vertices, normals, triangles) = (to.positions.len(), to.normals.len(), indices.len() / 3);
         if to.indices.is_empty() && vertices != self.vertices {
             return Err(format!("has {} vertices, not {vertices}: their number cannot change", self.vertices));
@@ -99,7 +100,7 @@ impl Soft {
         }
     }
 
-    fn place_part(&self, to: &Vertices, indices: &[u32], part: &[u32]) -> Result<Geometry, String> {
+    fn place_part(&self, to: &Vertices, indices: &[u32], part: &[u32]) -> Checked<Geometry> {
         let (mut geometry, mut repairs) = (Geometry::default(), Repairs::default());
         let tag = Tag { primitive: 0, material: NONE, object: 0 };
         for &triangle in part {

@@ -1,4 +1,5 @@
 //! From the `[camera]` table and the film's shape to the camera that kernels read.
+use crate::error::Checked;
 use crate::layout;
 use crate::scene::MAX_COORDINATE;
 use glam::{DMat4, DVec3};
@@ -64,7 +65,7 @@ impl Camera {
     ///
     /// # Errors
     /// A sentence that names the key at fault.
-    pub fn build(&self, size: [u32; 2], bounds: [[f32; 3]; 2]) -> Result<layout::Camera, String> {
+    pub fn build(&self, size: [u32; 2], bounds: [[f32; 3]; 2]) -> Checked<layout::Camera> {
         let (half_x, half_y) = self.half_film(size)?;
         let (position, [right, up, forward]) = match &self.world_from_camera {
             Some(rows) => frame_from_matrix(rows)?,
@@ -104,7 +105,7 @@ impl Camera {
     }
 
     /// Half of the film's width and height: at distance 1, or anywhere if rays are parallel.
-    fn half_film(&self, [width, height]: [u32; 2]) -> Result<(f64, f64), String> {
+    fn half_film(&self, [width, height]: [u32; 2]) -> Checked<(f64, f64)> {
         let half = self.half_edge()?;
         if width == 0 || height == 0 {
             return Err(format!("a film of {width}x{height} has no pixel"));
@@ -119,7 +120,7 @@ impl Camera {
         Ok(if along_x { (half, half / aspect) } else { (half * aspect, half) })
     }
 
-    fn half_edge(&self) -> Result<f64, String> {
+    fn half_edge(&self) -> Checked<f64> {
         let fov = self.fov.unwrap_or(40.0);
         match self.orthographic {
             Some(_) if self.fov.is_some() => Err("has both fov and orthographic: choose one".into()),
@@ -132,7 +133,7 @@ impl Camera {
         }
     }
 
-    fn frame_from_target(&self, bounds: [[f32; 3]; 2], tan: [f64; 2]) -> Result<Frame, String> {
+    fn frame_from_target(&self, bounds: [[f32; 3]; 2], tan: [f64; 2]) -> Checked<Frame> {
         let [low, high] = self.framed.unwrap_or(bounds).map(|b| DVec3::from(b.map(f64::from)));
         let target = self.target.map_or((low + high) / 2.0, DVec3::from);
         let position = self.position.map_or_else(|| overview(target, low, high, tan), DVec3::from);
@@ -166,7 +167,7 @@ fn overview(target: DVec3, low: DVec3, high: DVec3, tan: [f64; 2]) -> DVec3 {
     target + back * (0..8).map(|k| distance(corner(k) - target)).fold(least, f64::max)
 }
 
-fn frame_from_matrix(rows: &[f64; 16]) -> Result<Frame, String> {
+fn frame_from_matrix(rows: &[f64; 16]) -> Checked<Frame> {
     let refused = || "world_from_camera is not an invertible row-major affine matrix (last row 0 0 0 1)".to_owned();
     let m = DMat4::from_cols_array(rows).transpose();
     if !m.is_finite() || m.row(3).truncate() != DVec3::ZERO || m.w_axis.w == 0.0 {
@@ -189,7 +190,7 @@ fn axes(m: &DMat4) -> Option<[DVec3; 3]> {
     Some([axis(0, &[back, up])?, up, -back])
 }
 
-fn finite(position: DVec3) -> Result<(), String> {
+fn finite(position: DVec3) -> Checked {
     match position.is_finite() && position.abs().max_element() <= MAX_COORDINATE {
         true => Ok(()),
         false => Err(format!("point {position} is not within {:e}", MAX_COORDINATE)),

@@ -1,6 +1,7 @@
 //! The `[[light]]` tables.
 use super::keys::told;
 use super::value::Rgb;
+use crate::error::Checked;
 use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, NONE};
 use crate::scene::{MAX_COORDINATE, MAX_RADIANCE};
 use glam::Vec3;
@@ -51,7 +52,7 @@ impl LightTable {
     ///
     /// # Errors
     /// A sentence that names the key at fault.
-    pub fn build(&self) -> Result<Light, String> {
+    pub fn build(&self) -> Checked<Light> {
         let position = || finite(self.position.ok_or("needs a position")?, "position");
         let light = Light { triangle: NONE, material: NONE, ..Light::default() };
         match self.kind {
@@ -99,7 +100,7 @@ impl LightTable {
     }
 
     /// Unit direction in which the light travels.
-    fn axis(&self, from: Vec3) -> Result<[f32; 3], String> {
+    fn axis(&self, from: Vec3) -> Checked<[f32; 3]> {
         let direction = match (self.direction, self.target) {
             (Some(d), None) => Vec3::from(d),
             (None, Some(t)) if self.kind == Type::Spot => Vec3::from(t) - from,
@@ -110,7 +111,7 @@ impl LightTable {
     }
 }
 
-fn finite(v: [f32; 3], key: &str) -> Result<[f32; 3], String> {
+fn finite(v: [f32; 3], key: &str) -> Checked<[f32; 3]> {
     match v.iter().all(|v| v.abs() <= MAX_COORDINATE as f32) {
         true => Ok(v),
         false => Err(format!("{key} {v:?} is not within {:e}", MAX_COORDINATE)),
@@ -120,7 +121,7 @@ fn finite(v: [f32; 3], key: &str) -> Result<[f32; 3], String> {
 /// Largest intensity of a point or spot light, W/sr: in large units of length it is spread over the squares of large distances.
 const MAX_INTENSITY: f32 = 1e30;
 
-fn emitted(v: Option<Rgb>, key: &str, most: f32) -> Result<[f32; 3], String> {
+fn emitted(v: Option<Rgb>, key: &str, most: f32) -> Checked<[f32; 3]> {
     let v = v.ok_or_else(|| format!("needs {key}"))?.0;
     match v.iter().all(|v| (0.0..=most).contains(v)) {
         true => Ok(v),

@@ -1,4 +1,5 @@
 //! Geometry and pictures as scenes have them, whether they come out of files or out of an engine's memory.
+use crate::error::Checked;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,7 +27,7 @@ pub struct Mesh {
 impl Mesh {
     /// # Errors
     /// A sentence that says what does not fit together.
-    pub(in crate::scene) fn check(&self) -> Result<(), String> {
+    pub(in crate::scene) fn check(&self) -> Checked {
         let vertices = self.positions.len();
         let extras = [
             ("normals", self.normals.len()),

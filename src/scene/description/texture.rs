@@ -1,4 +1,5 @@
 //! Textures as materials name them: a file, or a picture in memory, and how it lies on a surface.
+use crate::error::Checked;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor, value};
 use std::fmt;
@@ -71,7 +72,7 @@ impl From<&str> for TextureTable {
 impl TextureTable {
     /// # Errors
     /// A sentence that names the key which is out of range.
-    pub(in crate::scene) fn check(&self) -> Result<(), String> {
+    pub(in crate::scene) fn check(&self) -> Checked {
         let Self { uv, offset, rotate, scale, .. } = self;
         if *uv > 1 {
             return Err(format!("uv is {uv}: a mesh has the sets 0 and 1 of texture coordinates"));
@@ -155,7 +156,7 @@ mod tests {
         t: TextureTable,
     }
 
-    fn read(text: &str) -> Result<TextureTable, String> {
+    fn read(text: &str) -> Checked<TextureTable> {
         toml::from_str::<Row>(&format!("t = {text}")).map(|row| row.t).map_err(|e| e.message().to_owned())
     }
 

@@ -1,4 +1,5 @@
 //! Values that a scene file may write in more than one way.
+use crate::error::Checked;
 use glam::{DAffine3, DMat4, DQuat, DVec3, EulerRot};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor, value};
 use std::fmt;
@@ -62,7 +63,7 @@ impl<'de> Deserialize<'de> for Rotation {
 ///
 /// # Errors
 /// A sentence about other numbers.
-pub fn rotation(v: &[f64]) -> Result<DQuat, String> {
+pub fn rotation(v: &[f64]) -> Checked<DQuat> {
     match *v {
         [x, y, z] => {
             let [x, y, z] = [x, y, z].map(f64::to_radians);

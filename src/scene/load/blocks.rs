@@ -1,5 +1,6 @@
 //! Text in blocks of whole statements, so that several can be parsed at the same time. Lines end as the system that wrote them has it:
 //! by line feeds, carriage returns or both. A line that ends in a backslash is one statement with the next.
+use crate::error::Checked;
 use std::borrow::Cow;
 use std::io::Read;
 
@@ -45,7 +46,7 @@ impl<R: Read> Blocks<R> {
         self.broken.as_deref()
     }
 
-    fn next(&mut self) -> Result<Option<Vec<u8>>, String> {
+    fn next(&mut self) -> Checked<Option<Vec<u8>>> {
         let mut block = std::mem::take(&mut self.rest);
         while !self.ended {
             let before = block.len();
@@ -63,7 +64,7 @@ impl<R: Read> Blocks<R> {
         Ok((!block.is_empty()).then_some(block))
     }
 
-    fn begin(&mut self, block: &mut Vec<u8>) -> Result<(), String> {
+    fn begin(&mut self, block: &mut Vec<u8>) -> Checked {
         if std::mem::replace(&mut self.begun, true) {
             return Ok(());
         }

@@ -2,6 +2,7 @@
 use super::mapping::Mapping;
 use super::metal;
 use super::texture::{Kind, TextureSet};
+use crate::error::Checked;
 use crate::layout::*;
 use crate::scene::description::keys;
 use crate::scene::description::material::{Distribution, MaterialTable, Type};
@@ -98,14 +99,14 @@ impl Materials {
     ///
     /// # Errors
     /// A sentence that names the key at fault.
-    pub fn push_table(&mut self, t: &MaterialTable, directory: &Path, warn: &mut Vec<String>) -> Result<u32, String> {
+    pub fn push_table(&mut self, t: &MaterialTable, directory: &Path, warn: &mut Vec<String>) -> Checked<u32> {
         warn.extend(keys::warning(t));
         if t.kind == Type::MetallicRoughness {
             return self.push_metallic(t, directory, warn);
         }
         let body = matches!(t.kind, Type::Diffuse | Type::Coated);
         let mut m = Self::plain([if body && t.color_texture.is_none() { 0.5 } else { 1.0 }; 3]);
-        let mut tint = |to: &mut [f32; 3], color: Option<Rgb>, key: &str| -> Result<(), String> {
+        let mut tint = |to: &mut [f32; 3], color: Option<Rgb>, key: &str| -> Checked {
             if let Some(color) = color {
                 *to = reflectance(color.0, &format!("material \"{}\": {key}", t.name), warn)?;
             }
@@ -145,7 +146,7 @@ impl Materials {
         Ok(self.push(&t.name, m))
     }
 
-    fn interface(&self, m: &mut Material, t: &MaterialTable) -> Result<(), String> {
+    fn interface(&self, m: &mut Material, t: &MaterialTable) -> Checked {
         let ior = t.ior.unwrap_or(1.5);
         if !(0.1..=10.0).contains(&ior) {
             return Err(format!("ior is {ior}: choose a value from 0.1 to 10"));
@@ -183,7 +184,7 @@ impl Materials {
         body: bool,
         directory: &Path,
         warn: &mut Vec<String>,
-    ) -> Result<(), String> {
+    ) -> Checked {
         if t.bump.is_some() && t.normal_map.is_some() {
             return Err("has both bump and normal_map: choose one".into());
         }
@@ -232,7 +233,7 @@ impl Materials {
         kind: Kind,
         directory: &Path,
         warn: &mut Vec<String>,
-    ) -> Result<u32, String> {
+    ) -> Checked<u32> {
         let Some(texture) = texture else { return Ok(NONE) };
         let file = texture.file.to_string_lossy().replace('\\', "/");
         texture.check().map_err(|what| format!("texture {file}: {what}"))?;
@@ -245,7 +246,7 @@ impl Materials {
 ///
 /// # Errors
 /// For a number out of range and for other kinds of materials.
-fn stretch(m: &mut Material, alpha_v: f32) -> Result<(), String> {
+fn stretch(m: &mut Material, alpha_v: f32) -> Checked {
     within(alpha_v, 1.0, "alpha_v")?;
     if !matches!(m.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) {
         return Err("has alpha_v, which is for conductors and dielectrics".to_owned());
@@ -266,7 +267,7 @@ pub fn has_normal_map(m: &Material) -> bool {
 ///
 /// # Errors
 /// For one that is out of range.
-pub fn emission(t: &MaterialTable) -> Result<[f32; 3], String> {
+pub fn emission(t: &MaterialTable) -> Checked<[f32; 3]> {
     let strength = t.emission_strength.unwrap_or(1.0);
     let emission = t.emission.map_or([f32::from(t.emission_texture.is_some()); 3], |v| v.0);
     radiance(emission.map(|v| v * strength), "emission")
@@ -276,7 +277,7 @@ pub fn emission(t: &MaterialTable) -> Result<[f32; 3], String> {
 ///
 /// # Errors
 /// For one that is not finite.
-pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Result<[f32; 3], String> {
+pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Checked<[f32; 3]> {
     if !color.iter().all(|v| v.is_finite()) {
         return Err(format!("{what} is not finite"));
     }
@@ -291,7 +292,7 @@ pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Resul
 ///
 /// # Errors
 /// With the colour and `what` it is, for another one.
-pub fn radiance(color: [f32; 3], what: &str) -> Result<[f32; 3], String> {
+pub fn radiance(color: [f32; 3], what: &str) -> Checked<[f32; 3]> {
     match color.iter().all(|v| (0.0..=MAX_RADIANCE).contains(v)) {
         true => Ok(color),
         false => Err(format!("{what} {color:?} is negative, NaN or above {MAX_RADIANCE:e}")),
@@ -302,7 +303,7 @@ pub fn radiance(color: [f32; 3], what: &str) -> Result<[f32; 3], String> {
 ///
 /// # Errors
 /// With the key, for another one.
-pub fn within(v: f32, max: f32, key: &str) -> Result<f32, String> {
+pub fn within(v: f32, max: f32, key: &str) -> Checked<f32> {
     match v {
         v if (0.0..=max).contains(&v) => Ok(v),
         v => Err(format!("{key} is {v}: choose a value from 0 to {max}")),

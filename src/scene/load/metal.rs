@@ -1,4 +1,5 @@
 //! Optical constants: metals by name, indices from a reflectance.
+use crate::error::Checked;
 
 /// Names, then index of refraction and extinction for linear Rec. 709 red, green, blue.
 type Metal = (&'static [&'static str], [f32; 3], [f32; 3]);
@@ -17,7 +18,7 @@ const METALS: &[Metal] = &[
 ///
 /// # Errors
 /// A sentence with the names that are known.
-pub fn metal(name: &str) -> Result<([f32; 3], [f32; 3]), String> {
+pub fn metal(name: &str) -> Checked<([f32; 3], [f32; 3])> {
     let lower = name.to_lowercase();
     match METALS.iter().find(|(names, ..)| names.contains(&lower.as_str())) {
         Some(&(_, eta, k)) => Ok((eta, k)),

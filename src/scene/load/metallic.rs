@@ -1,6 +1,7 @@
 //! Makes materials of `[[material]]` tables of type `metallic-roughness`.
 use super::material::{Materials, emission, reflectance, within};
 use super::texture::Kind;
+use crate::error::Checked;
 use crate::layout::*;
 use crate::scene::description::material::{AlphaMode, MaterialTable};
 use crate::scene::description::texture::TextureTable;
@@ -18,12 +19,7 @@ impl Materials {
     ///
     /// # Errors
     /// A sentence that names the key at fault.
-    pub fn push_metallic(
-        &mut self,
-        table: &MaterialTable,
-        directory: &Path,
-        warn: &mut Vec<String>,
-    ) -> Result<u32, String> {
+    pub fn push_metallic(&mut self, table: &MaterialTable, directory: &Path, warn: &mut Vec<String>) -> Checked<u32> {
         let (mut m, mut s) = (Self::plain([1.0; 3]), Source { table, directory, warn });
         let what = format!("material \"{}\": color", table.name);
         m.base_color = reflectance(table.color.map_or([1.0; 3], |v| v.0), &what, s.warn)?;
@@ -58,11 +54,11 @@ impl Materials {
         Ok(index)
     }
 
-    fn texture(&mut self, s: &mut Source, texture: &Option<TextureTable>, kind: Kind) -> Result<u32, String> {
+    fn texture(&mut self, s: &mut Source, texture: &Option<TextureTable>, kind: Kind) -> Checked<u32> {
         self.ask(texture.as_ref(), kind, s.directory, s.warn)
     }
 
-    fn layers(&mut self, m: &mut Material, s: &mut Source) -> Result<(), String> {
+    fn layers(&mut self, m: &mut Material, s: &mut Source) -> Checked {
         let t = s.table;
         let unit = |v: Option<f32>, default: f32, key: &str| within(v.unwrap_or(default), 1.0, key);
         m.kind = BSDF_METALLIC;
@@ -94,7 +90,7 @@ impl Materials {
     }
 
     /// Returns whether alpha makes holes, that of vertices too: not below a cutoff of 0.
-    fn opacity(&mut self, m: &mut Material, s: &mut Source) -> Result<bool, String> {
+    fn opacity(&mut self, m: &mut Material, s: &mut Source) -> Checked<bool> {
         let t = s.table;
         let alpha = within(t.opacity.unwrap_or(1.0), 1.0, "opacity")?;
         let cutoff = within(t.alpha_cutoff.unwrap_or(0.5), 1e6, "alpha_cutoff")?;
@@ -118,7 +114,7 @@ impl Materials {
 ///
 /// # Errors
 /// For a colour that is out of range.
-pub fn reflected_head_on(specular: [f32; 3], ior: f32) -> Result<[f32; 3], String> {
+pub fn reflected_head_on(specular: [f32; 3], ior: f32) -> Checked<[f32; 3]> {
     match specular.iter().all(|v| (0.0..=1e6).contains(v)) {
         true => Ok(specular.map(|v| v * ((ior - 1.0) / (ior + 1.0)).powi(2))),
         false => Err(format!("specular {specular:?} is negative, NaN or above 1e6")),

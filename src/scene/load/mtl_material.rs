@@ -17,6 +17,7 @@ use super::material::{Materials, radiance, reflectance};
 use super::metal;
 use super::mtl::{Map, Mtl, map};
 use super::texture::Kind;
+use crate::error::Checked;
 use crate::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, MATERIAL_NORMAL_MAP, Material, NONE};
 use crate::scene::MAX_COORDINATE;
 use crate::scene::description::material::Type;
@@ -26,7 +27,7 @@ impl Materials {
     ///
     /// # Errors
     /// A sentence that names the statement at fault.
-    pub fn push_mtl(&mut self, mtl: &Mtl, warn: &mut Vec<String>) -> Result<u32, String> {
+    pub fn push_mtl(&mut self, mtl: &Mtl, warn: &mut Vec<String>) -> Checked<u32> {
         let block = &mtl.block;
         let mut m = Self::plain([0.0; 3]);
         let named = |key: &str| format!("material \"{}\": {key}", mtl.name());
@@ -126,7 +127,7 @@ fn mtl_kind(mtl: &Mtl, kd: [f32; 3], ks: [f32; 3], d: f32) -> Type {
     }
 }
 
-fn mtl_interface(m: &mut Material, mtl: &Mtl, kind: Type, ks: [f32; 3], warn: &mut Vec<String>) -> Result<(), String> {
+fn mtl_interface(m: &mut Material, mtl: &Mtl, kind: Type, ks: [f32; 3], warn: &mut Vec<String>) -> Checked {
     let glossy = (2.0 / (mtl.block.shininess.unwrap_or(0.0).max(0.0) + 2.0)).sqrt();
     let default = if matches!(kind, Type::Mirror | Type::Dielectric) { 0.0 } else { glossy };
     m.alpha = mtl.number("Pr").map_or(default, |pr| pr.clamp(0.0, 1.0).powi(2));

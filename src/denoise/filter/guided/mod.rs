@@ -6,7 +6,7 @@ mod table;
 
 use super::as_light::{AsLight, as_light};
 use super::{Filter, Planes, Row};
-use crate::error::Result;
+use crate::error::{Checked, Result};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, MAX_GROUPS, Recorder, Tuning};
 use crate::layout::{GuidedPush, float, vec4};
 use crate::settings::{Is, choices, settings};
@@ -78,7 +78,7 @@ fn step(radius: u32) -> u32 {
 
 /// One number for all channels, or four.
 #[cfg(feature = "cli")]
-fn per_channel(text: &str) -> std::result::Result<vec4, String> {
+fn per_channel(text: &str) -> Checked<vec4> {
     let numbers: std::result::Result<Vec<f32>, _> = text.split(',').map(str::parse).collect();
     match numbers.as_deref() {
         Ok([n]) => Ok([*n; 4]),

@@ -1,4 +1,5 @@
 //! The binary form of glTF: a header of 12 bytes, and chunks of a length, a kind and content.
+use crate::error::Checked;
 
 /// The first four bytes of a `.glb` file.
 const MAGIC: &[u8] = b"glTF";
@@ -10,7 +11,7 @@ pub type Parts<'a> = (&'a [u8], Option<&'a [u8]>);
 ///
 /// # Errors
 /// A sentence about a chunk that is missing or longer than the file.
-pub fn split(bytes: &[u8]) -> Result<Parts<'_>, String> {
+pub fn split(bytes: &[u8]) -> Checked<Parts<'_>> {
     let Some(header) = bytes.strip_prefix(MAGIC) else {
         return Ok((bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes), None));
     };

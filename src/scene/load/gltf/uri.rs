@@ -1,4 +1,5 @@
 //! What a URI in a glTF file leads to: data in itself, or a file below the asset's folder and nowhere else.
+use crate::error::Checked;
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -25,7 +26,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 ///
 /// # Errors
 /// A sentence about a URI of another machine, one that leads out of the folder, or data that cannot be decoded.
-pub fn resolve(folder: &Path, uri: &str) -> Result<Target, String> {
+pub fn resolve(folder: &Path, uri: &str) -> Checked<Target> {
     if let Some(rest) = uri.strip_prefix("data:") {
         return data(rest).map(Target::Data);
     }
@@ -55,7 +56,7 @@ pub fn resolve(folder: &Path, uri: &str) -> Result<Target, String> {
 }
 
 /// The content of a `data:` URI, after the scheme.
-fn data(rest: &str) -> Result<Vec<u8>, String> {
+fn data(rest: &str) -> Checked<Vec<u8>> {
     let (kind, content) = rest.split_once(',').ok_or("is a data: URI without a comma: export the file again")?;
     if !kind.ends_with(";base64") {
         return percent_decoded(content);
@@ -64,12 +65,12 @@ fn data(rest: &str) -> Result<Vec<u8>, String> {
     BASE64.decode(written).map_err(|e| format!("is not valid base64 ({e}): export the file again"))
 }
 
-fn decode(uri: &str) -> Result<String, String> {
+fn decode(uri: &str) -> Checked<String> {
     String::from_utf8(percent_decoded(uri)?).map_err(|_| "is not UTF-8 once its % codes are decoded".into())
 }
 
 /// Replaces `%20` and its like by the bytes that they stand for. Exporters forget to encode `%`: what is no code stays.
-fn percent_decoded(text: &str) -> Result<Vec<u8>, String> {
+fn percent_decoded(text: &str) -> Checked<Vec<u8>> {
     let (bytes, mut out) = (text.as_bytes(), Vec::new());
     out.try_reserve_exact(bytes.len()).map_err(|_| "needs more memory than the system gives")?;
     let hex = |at: usize| bytes.get(at).and_then(|&c| char::from(c).to_digit(16));
@@ -86,7 +87,7 @@ fn percent_decoded(text: &str) -> Result<Vec<u8>, String> {
 mod tests {
     use super::*;
 
-    fn file(uri: &str) -> Result<Target, String> {
+    fn file(uri: &str) -> Checked<Target> {
         resolve(Path::new("a"), uri)
     }
 

@@ -1,5 +1,6 @@
 //! Tells normal maps in tangent space from heights by what pictures hold.
 use super::source::Source;
+use crate::error::Checked;
 use crate::image::{bands, decode, picture};
 
 /// Sums over the texels of a picture.
@@ -15,7 +16,7 @@ struct Sums {
 ///
 /// # Errors
 /// What is wrong with the picture.
-pub fn are_in(source: Source) -> Result<bool, String> {
+pub fn are_in(source: Source) -> Checked<bool> {
     let mut sums = Sums::default();
     let coded = |v: u8| f32::from(v) / 255.0;
     match source {
