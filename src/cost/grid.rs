@@ -6,7 +6,7 @@ use crate::denoise::filter::{self, FilterSettings};
 use crate::error::{Error, Result};
 use crate::render::settings::Settings;
 use crate::render::{Outputs, Reproject};
-use crate::settings::entry::{Entry, Value};
+use crate::settings::entry::Value;
 
 /// The lists that a grid is made of.
 #[derive(Clone)]
@@ -143,19 +143,6 @@ pub fn shots(candidates: &[Candidate]) -> Vec<Shot> {
     shots
 }
 
-/// Options of a command that turn settings with the entries `from` into those with the entries `to`, such as `--spp 8`.
-pub fn options(from: &[Entry], to: &[Entry]) -> Vec<String> {
-    let changed = from.iter().zip(to).filter(|(from, to)| from.value != to.value).map(|(_, to)| to);
-    let option = |Entry { name, value, is_switch, .. }: &Entry| match (name.as_str(), is_switch) {
-        ("policy", _) => format!("--allocate {value}"),
-        (_, true) => format!("--{name}"),
-        // A hyphen behind a space would begin an option.
-        _ if value.starts_with('-') => format!("--{name}={value}"),
-        _ => format!("--{name} {value}"),
-    };
-    changed.map(option).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,17 +173,6 @@ mod tests {
         assert_eq!(shots.len(), 2 * 2 + 2 * 4);
         assert_eq!(shots[2].points, [2, 4], "atrous and auto at 1 spp");
         assert!(!shots[0].outputs.guides && shots[2].outputs.guides);
-    }
-
-    #[test]
-    fn options_are_those_that_differ() {
-        let all = made(&["both"], &["none"]);
-        let from = Settings::default().entries();
-        assert_eq!(options(&from, &all[3].settings.entries()), ["--spp 4", "--allocate both", "--rounds 2"]);
-        let darker = all[0].varied("", |s, _, _| s.allocate.variance.luminance_floor = -1.0).unwrap();
-        assert_eq!(options(&all[0].settings.entries(), &darker.settings.entries()), ["--luminance-floor=-1"]);
-        let changed = FilterSettings::default().with(|s| s.atrous.conserve_energy = true);
-        assert_eq!(options(&FilterSettings::default().entries(), &changed.entries()), ["--conserve-energy"]);
     }
 
     #[test]

@@ -91,3 +91,35 @@ pub fn check(entries: &[Entry]) -> Result<()> {
         None => Ok(()),
     }
 }
+
+/// Options of a command that turn settings with the entries `from` into those with the entries `to`, such as ` --spp 8`: a space before
+/// each.
+pub fn options(from: &[Entry], to: &[Entry]) -> String {
+    let changed = from.iter().zip(to).filter(|(from, to)| from.value != to.value).map(|(_, to)| to);
+    let option = |Entry { name, value, is_switch, .. }: &Entry| match (name.as_str(), is_switch) {
+        ("policy", _) => format!(" --allocate {value}"),
+        (_, true) => format!(" --{name}"),
+        // A hyphen behind a space would begin an option.
+        _ if value.starts_with('-') => format!(" --{name}={value}"),
+        _ => format!(" --{name} {value}"),
+    };
+    changed.map(option).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_those_that_differ() {
+        let entries = |policy: u32, spp: u32, floor: f32, switch: bool| {
+            let numbers = [Entry::new("policy", &policy, ..), Entry::new("spp", &spp, ..)];
+            let others = [Entry::new("luminance_floor", &floor, ..), Entry::new("conserve_energy", &switch, ..)];
+            [numbers, others].concat()
+        };
+        let from = entries(0, 1, 0.5, false);
+        assert_eq!(options(&from, &entries(2, 4, 0.5, false)), " --allocate 2 --spp 4");
+        assert_eq!(options(&from, &entries(0, 1, -1.0, true)), " --luminance-floor=-1 --conserve-energy");
+        assert_eq!(options(&from, &from), "");
+    }
+}

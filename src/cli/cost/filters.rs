@@ -3,10 +3,11 @@ use super::{Args, measured, scene_info};
 use crate::cli::filter::options::Overrides;
 use crate::cli::{Exit, quoted};
 use crate::cost::filter_only::{FilterCandidate, FilterPlan, key, measure_filters};
-use crate::cost::{grid, reference};
+use crate::cost::reference;
 use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::image;
+use crate::settings::entry;
 use clap::Parser;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -60,8 +61,7 @@ fn candidate(image: &Path, filter: Method, [shared, variant]: [&str; 2], device:
     settings.validate()?;
     let options = Some(variant.to_owned()).filter(|variant| !variant.is_empty());
     let path = quoted(&image.display().to_string());
-    let words = grid::options(&FilterSettings::default().entries(), &settings.entries());
-    let words = words.into_iter().map(|word| format!(" {word}")).collect::<String>();
+    let words = entry::options(&FilterSettings::default().entries(), &settings.entries());
     let command = format!("tallow filter {path} --filter {}{words}{device} -o point.exr", filter.name());
     Ok(FilterCandidate { filter, settings, options: options.into_iter().collect(), command })
 }

@@ -132,9 +132,8 @@ pub fn command(
     ray_queries: bool,
     device: &str,
 ) -> String {
-    let words = |words: Vec<String>| words.into_iter().map(|word| format!(" {word}")).collect::<String>();
     let tracing = if ray_queries { " --tracing ray-query" } else { "" };
-    let settings = words(grid::options(&from.entries(), &candidate.settings.entries())) + tracing + device;
+    let settings = entry::options(&from.entries(), &candidate.settings.entries()) + tracing + device;
     let (render, number) = match judged {
         None => (format!("tallow render {scene}{settings}"), String::new()),
         Some(judged) => {
@@ -143,7 +142,7 @@ pub fn command(
             let frames = format!("--frames 0..={0} --only {first}..={0} --fps {1}", judged.frame, judged.fps);
             let options = |how: Reproject| {
                 let from = Reproject { reproject: how.reproject, ..Reproject::default() };
-                format!("{}{}", how.reproject.text(), words(grid::options(&from.entries(), &how.entries())))
+                format!("{}{}", how.reproject.text(), entry::options(&from.entries(), &how.entries()))
             };
             let reproject = format!(" --reproject {}", how.map_or("off".to_owned(), options));
             (format!("tallow sequence {scene}{settings} {frames}{reproject}"), format!(".{:04}", judged.frame))
@@ -151,7 +150,7 @@ pub fn command(
     };
     let out = |name: &str| format!("{name}{}", if number.is_empty() { "" } else { ".####" });
     let Some(filter) = candidate.filter.map(Method::name) else { return format!("{render} -o {}.hdr", out("point")) };
-    match &words(grid::options(&FilterSettings::default().entries(), &candidate.filter_settings.entries()))[..] {
+    match &entry::options(&FilterSettings::default().entries(), &candidate.filter_settings.entries())[..] {
         "" => format!("{render} --denoise {filter} -o {}.exr", out("point")),
         own => format!(
             "{render} -o {}.exr && tallow filter noisy{number}.exr --filter {filter}{own}{device} -o point{number}.exr",

@@ -1,7 +1,6 @@
 //! `--time`, `--error` and `--plan`: a render whose samples and filter are planned, or were planned by an earlier one.
 use super::{Args, check_room};
 use crate::cli::files::Item;
-use crate::cost::grid;
 use crate::denoise::filter::Method;
 use crate::error::{Checked, Error, Result};
 use crate::gpu::{Gpu, milliseconds};
@@ -9,6 +8,7 @@ use crate::image::input;
 use crate::plan::{self, Plan, Target};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
+use crate::settings::entry;
 use std::path::Path;
 use std::time::Duration;
 
@@ -102,10 +102,9 @@ pub fn applied(args: &Args, settings: Settings, plan: Option<&Plan>) -> Result<(
 
 /// What a render goes on with that followed a plan: the plan's filter, and its settings where others were asked for.
 pub fn instead(plan: &Plan, asked: &Settings) -> String {
-    let settings = grid::options(&asked.entries(), &plan.settings.entries());
-    let filter = plan.chosen.denoise.iter().map(|filter| format!("--denoise {filter}"));
-    let options: String = settings.into_iter().chain(filter).map(|option| format!(" {option}")).collect();
-    format!("{options} in place of --time, --error and --plan")
+    let settings = entry::options(&asked.entries(), &plan.settings.entries());
+    let filter = plan.chosen.denoise.as_ref().map_or_else(String::new, |filter| format!(" --denoise {filter}"));
+    format!("{settings}{filter} in place of --time, --error and --plan")
 }
 
 /// The plan's file.
