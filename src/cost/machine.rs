@@ -9,7 +9,7 @@ pub fn describe(gpu: &Gpu) -> Machine {
     Machine {
         device: info.name.clone(),
         kind: info.kind.to_string(),
-        driver: format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info).trim().to_owned(),
+        driver: info.driver(),
         ray_queries: gpu.traces_by_ray_query(),
         cpu: cpu(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),

@@ -204,6 +204,14 @@ pub(super) fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>> {
     Ok(devices.into_iter().map(|physical| describe(instance, physical, None)).collect())
 }
 
+impl DeviceInfo {
+    /// The driver's name, version and build.
+    pub fn driver(&self) -> String {
+        let Self { driver_name, driver_version, driver_info, .. } = self;
+        format!("{driver_name} {driver_version} {driver_info}").trim().to_owned()
+    }
+}
+
 /// Describes a device as seen from `queue_family`, or from the best family for compute.
 pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, queue_family: Option<u32>) -> Candidate {
     // SAFETY: `physical` belongs to `instance`, here and below.

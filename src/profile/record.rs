@@ -255,11 +255,7 @@ impl Host {
     /// The machine of this device.
     pub fn of(gpu: &Gpu) -> Self {
         let info = gpu.info();
-        Self {
-            device: info.name.clone(),
-            driver: format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info),
-            cpu: machine::cpu(),
-        }
+        Self { device: info.name.clone(), driver: info.driver(), cpu: machine::cpu() }
     }
 }
 

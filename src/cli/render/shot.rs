@@ -78,7 +78,7 @@ fn metadata(args: &Args, gpu: &Gpu, seconds: f64) -> BTreeMap<String, String> {
     let entries = [
         ("scene", args.scene.display().to_string()),
         ("device", info.name.clone()),
-        ("driver", format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info)),
+        ("driver", info.driver()),
         ("cpu", crate::machine::cpu()),
         ("renderSeconds", format!("{seconds:.3}")),
         ("dateUnix", since_epoch.as_secs().to_string()),
