@@ -8,7 +8,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub(crate) type Checked<T = ()> = std::result::Result<T, String>;
 
 /// The kinds of errors, distinguished by what can be done about them. [`Error::exit_code`] is the command line's exit code.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// An option or a setting out of range, alone or together with another.

@@ -1,4 +1,5 @@
 //! Points of other renderers, to be seen beside ours: a table names their images and how long each took.
+use super::assemble::failure;
 use super::document::{Method, Point, Run};
 use super::judge::judge;
 use super::reference::Reference;
@@ -95,7 +96,7 @@ pub fn judged(runs: &[OtherRun], reference: &Reference) -> Vec<(Point, Option<Pi
                 point.runs.push(judged);
                 first.get_or_insert(picture);
             }
-            Err(e) => point.failed = Some(e.to_string().replace('\n', " ")),
+            Err(e) => point.failed = Some(failure(&e)),
         }
     }
     points

@@ -216,7 +216,7 @@ impl Runs for Session<'_> {
 
     /// Renders a shot with a seed and filters it for its points, in the order of `points`.
     fn run(&mut self, shot: usize, seed: u32, points: &[usize], stop: &dyn Fn() -> bool) -> Outcome {
-        let failed = |e: Error| points.iter().map(|&point| (point, Err(again(&e)))).collect();
+        let failed = |e: Error| points.iter().map(|&point| (point, Err(e.clone()))).collect();
         let rendered = match self.render(shot, seed, stop) {
             Ok(Some(rendered)) => rendered,
             Ok(None) => return Vec::new(),
@@ -264,13 +264,4 @@ fn passes(times: &[PassTime]) -> Vec<Pass> {
         }
     }
     passes
-}
-
-/// The same error once more, for each of several points.
-fn again(e: &Error) -> Error {
-    match e {
-        Error::Usage(what) => Error::Usage(what.clone()),
-        Error::Memory(what) => Error::Memory(what.clone()),
-        other => Error::Device(other.to_string()),
-    }
 }
