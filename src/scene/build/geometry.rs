@@ -257,7 +257,7 @@ pub fn firsts<T: PartialEq>(count: usize, hash: impl Fn(usize) -> u64 + Sync, of
 }
 
 /// Drops what is not kept from `start` on; `items` may be empty.
-fn retain<T: Copy>(items: &mut Vec<T>, start: usize, keep: &[bool]) {
+pub fn retain<T: Copy>(items: &mut Vec<T>, start: usize, keep: &[bool]) {
     let tail = items.get(start..).unwrap_or_default();
     let kept: Vec<T> = tail.iter().zip(keep).filter(|(_, keep)| **keep).map(|(item, _)| *item).collect();
     items.truncate(start);

@@ -110,9 +110,9 @@ pub fn list(scene: &mut Scene) -> Result<()> {
     drop_copies(scene.rig.lights.len(), &mut lights, &mut numbers);
     let mut powers: Vec<f64> = lights.iter().map(|l| weight(scene, l) * power(scene, l)).collect();
     let shines: Vec<bool> = powers.iter().map(|&p| p > 0.0).collect();
-    keep(&mut lights, &shines);
-    keep(&mut numbers, &shines);
-    keep(&mut powers, &shines);
+    geometry::retain(&mut lights, 0, &shines);
+    geometry::retain(&mut numbers, 0, &shines);
+    geometry::retain(&mut powers, 0, &shines);
     leave_sky(scene, &lights, &mut powers);
     share(&lights, &mut powers);
     let total: f64 = powers.iter().sum();
@@ -208,16 +208,9 @@ fn drop_copies(start: usize, lights: &mut Vec<Light>, numbers: &mut Vec<u64>) {
         let (corners, rest) = place(i);
         xxh3_64_with_seed(bytemuck::bytes_of(&corners), xxh3_64(bytemuck::bytes_of(&rest)))
     };
-    let mut first = geometry::firsts(lights.len() - start, hash, place);
-    first.splice(0..0, std::iter::repeat_n(true, start));
-    keep(lights, &first);
-    keep(numbers, &first);
-}
-
-/// Drops the items that are not `kept`.
-fn keep<T>(items: &mut Vec<T>, kept: &[bool]) {
-    let mut kept = kept.iter();
-    items.retain(|_| kept.next() == Some(&true));
+    let first = geometry::firsts(lights.len() - start, hash, place);
+    geometry::retain(lights, start, &first);
+    geometry::retain(numbers, start, &first);
 }
 
 /// Bits of a lamp's corners. Adding 0 makes -0 the same.
