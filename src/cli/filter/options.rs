@@ -1,6 +1,6 @@
 //! Options of `tallow filter` for layers and filter settings.
 use crate::cli::common::with_ranges;
-use crate::denoise::filter::{FILTERS, FilterOverrides, FilterSettings, Method, Row, readers};
+use crate::denoise::filter::{FilterOverrides, FilterSettings, Method, readers};
 use crate::image::aov::{Aov, Names};
 use clap::builder::PossibleValue;
 use clap::{Arg, ValueEnum};
@@ -91,16 +91,6 @@ impl ValueEnum for Method {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.name()).help(self.about()))
-    }
-}
-
-impl ValueEnum for &'static Row {
-    fn value_variants<'a>() -> &'a [Self] {
-        FILTERS
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name).help(self.about))
     }
 }
 
