@@ -114,9 +114,9 @@ impl Args {
         vec![checkpoint::default_output(&self.scene)]
     }
 
-    /// What filters the film. `none` does so only to fill in indirect light that is not traced for every pixel.
+    /// What filters the film, if anything does.
     pub fn filter(&self, settings: &Settings) -> Option<Method> {
-        self.denoise.filter(|method| !method.is_none() || settings.indirect_stride > 1)
+        self.denoise.filter(|method| method.changes(settings.indirect_stride))
     }
 
     /// More than radiance is kept only where a file or a filter takes it.

@@ -32,8 +32,7 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     args.denoise.map(row).transpose()?;
     let (file, settings) = args.choices.open_at_rest(&args.scene, &args.overrides)?;
     settings.validate()?;
-    // As of a render: without gaps to fill in there is nothing to do for `none`.
-    let denoise = args.denoise.filter(|method| !method.is_none() || settings.indirect_stride > 1);
+    let denoise = args.denoise.filter(|method| method.changes(settings.indirect_stride));
     let filter = denoise.map(row).transpose()?;
     let scene = file.load()?.scene;
     let outputs: Vec<_> = args.outputs().map(|(option, path)| (option, path.to_owned())).collect();

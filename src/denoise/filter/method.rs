@@ -31,6 +31,11 @@ impl Method {
         matches!(self, Self::Kernels(row) if row.name == none::ROW.name)
     }
 
+    /// Whether it changes an image whose light was traced for pixels `stride` apart: `none` fills in the others, and does nothing else.
+    pub fn changes(self, stride: u32) -> bool {
+        !self.is_none() || stride > 1
+    }
+
     /// Whether it is given what the lens blurs, sharp light and textures, too.
     pub(crate) fn weighs_noise(self) -> bool {
         matches!(self, Self::Kernels(row) if row.weighs_noise)
