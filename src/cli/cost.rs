@@ -6,6 +6,7 @@ mod output;
 mod points;
 
 use super::files::scene_name;
+use super::progress::Stages;
 use super::{Exit, complain, fail_on_messages, interrupt, quoted};
 use crate::cost::document::SceneInfo;
 use crate::cost::{Document, Ended, Images, JudgedFrame, Plan, Watch, key, measure, others, reference, seeds_of};
@@ -13,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{self, Gpu};
 use crate::scene::Scene;
 pub use options::Args;
-use output::{Folder, Shown, missing, text};
+use output::{Folder, missing, text};
 use points::Points;
 use serde::Serialize;
 use std::path::Path;
@@ -95,11 +96,11 @@ fn measured(
     let earlier = folder.earlier(key);
     let runs_before = earlier.as_ref().map_or(0, runs);
     let stop = interrupt::flag();
-    let shown = Shown::new(!args.common.talkative());
-    let progress = |what: &str, done: u64, total: u64| shown.set(what, done, total);
+    let stages = Stages::new(!args.common.talkative());
+    let progress = |what: &str, done: u64, total: u64| stages.set(what, done, total);
     let keep = |document: &Document| folder.keep(document);
     let found = measure(earlier, &Watch { stop: &|| stop.load(Ordering::SeqCst), progress: &progress, keep: &keep });
-    shown.finish();
+    stages.finish();
     let found = found?;
     fail_on_messages(gpu)?;
     finish(args, &folder, found, runs_before, warnings)

@@ -3,6 +3,7 @@ mod text;
 
 use super::choices::Choices;
 use super::overrides::Overrides;
+use super::progress::Stages;
 use super::{Exit, complain, print, print_json};
 use crate::cost::document::Estimate;
 use crate::cost::interval;
@@ -12,7 +13,6 @@ use crate::layout::*;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Job, Outputs, Renderer, bytes_in_flight, called_for};
 use crate::scene::{self, Loaded, Scene};
-use indicatif::ProgressBar;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -219,8 +219,9 @@ fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<Sizes> 
     let first = usual()?.cost.compile_ms;
     let mut usual = usual()?;
     usual.cost.compile_ms = usual.cost.compile_ms.min(first);
-    let bar = ProgressBar::new(rows.len() as u64);
-    for row in rows {
+    let (stages, all) = (Stages::new(false), rows.len() as u64);
+    for (row, done) in rows.iter_mut().zip(0..) {
+        stages.set("effects", done, all);
         let effect = Effect::ALL.iter().copied().find(|effect| effect.name() == row.effect);
         let then = effect.map_or(base, |effect| base.toggled(effect));
         let guides = effect.is_some();
@@ -236,9 +237,8 @@ fn measure(rows: &mut [EffectRow], args: &Args, scene: Loaded) -> Result<Sizes> 
             row.gpu_ms_added = low.zip(high).map(<[f64; 2]>::from);
             row.compile_ms = Some((with.compile_ms - without.compile_ms).max(0.0));
         }
-        bar.inc(1);
     }
-    bar.finish_and_clear();
+    stages.finish();
     Ok(Sizes { timed_size: scene.settings.size(), film_size: whole.size() })
 }
 

@@ -1,9 +1,9 @@
-//! The progress bar of a render, on stderr.
+//! Progress bars on stderr. They are hidden if that is no terminal.
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
-/// A bar with percent, speed and remaining time. It is hidden if stderr is no terminal.
+/// The bar of a render, with percent, speed and remaining time.
 pub struct Progress {
     bar: ProgressBar,
     start: Instant,
@@ -13,8 +13,7 @@ pub struct Progress {
 impl Progress {
     /// Makes a bar for a total of `total_samples` samples; `quiet` hides it.
     pub fn new(total_samples: u64, quiet: bool) -> Self {
-        let hidden = quiet || !std::io::stderr().is_terminal();
-        let target = if hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
+        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
         let bar = ProgressBar::with_draw_target(Some(total_samples), target);
         let template = "{percent:>3} % [{wide_bar}] {msg}, {eta} left";
         let style = ProgressStyle::with_template(template).expect("a constant template");
@@ -25,13 +24,6 @@ impl Progress {
     /// Shows the number of samples that are done.
     pub fn set(&mut self, samples: u64) {
         self.bar.set_position(samples);
-    }
-
-    /// Shows how much of a stage is done, of a total that may grow.
-    pub fn set_of(&mut self, stage: &str, done: u64, total: u64) {
-        self.bar.set_length(total);
-        self.bar.set_position(done);
-        self.bar.set_message(stage.to_owned());
     }
 
     /// Whether the bar is visible and its speed older than 200 ms.
@@ -48,6 +40,38 @@ impl Progress {
     /// Removes the bar, so that what is printed next starts on a clean line.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// A bar for each stage of a measurement, one after the other.
+pub struct Stages {
+    quiet: bool,
+    bar: RefCell<Option<(String, Progress)>>,
+}
+
+impl Stages {
+    /// Makes one that shows nothing if it is `quiet`.
+    pub fn new(quiet: bool) -> Self {
+        Self { quiet, bar: RefCell::new(None) }
+    }
+
+    /// Shows how much of a stage is done, of a total that may grow.
+    pub fn set(&self, stage: &str, done: u64, total: u64) {
+        let mut shown = self.bar.borrow_mut();
+        if shown.as_ref().is_none_or(|(last, _)| last != stage) {
+            shown.iter().for_each(|(_, progress)| progress.finish());
+            *shown = Some((stage.to_owned(), Progress::new(total, self.quiet)));
+        }
+        if let Some((_, Progress { bar, .. })) = shown.as_ref() {
+            bar.set_length(total);
+            bar.set_position(done);
+            bar.set_message(stage.to_owned());
+        }
+    }
+
+    /// Removes the bar.
+    pub fn finish(&self) {
+        self.bar.borrow().iter().for_each(|(_, progress)| progress.finish());
     }
 }
 

@@ -1,6 +1,5 @@
 //! What `tallow cost` reads, writes, shows and prints.
 use crate::cli::files::{Files, Item, check_distinct, partial_name};
-use crate::cli::progress::Progress;
 use crate::cli::readable;
 use crate::cost::changes::{option, plain};
 use crate::cost::document::{Document, Point, SCHEMA};
@@ -177,36 +176,6 @@ fn read(file: &Path) -> Result<Document> {
 
 fn not_ours(file: &Path, e: &serde_json::Error) -> Error {
     Error::input(file, format!("is no result of tallow cost: {e}; take another folder with -o"))
-}
-
-/// A progress bar for each stage.
-pub struct Shown {
-    quiet: bool,
-    bar: RefCell<Option<(String, Progress)>>,
-}
-
-impl Shown {
-    /// Makes one that shows nothing if it is `quiet`.
-    pub fn new(quiet: bool) -> Self {
-        Self { quiet, bar: RefCell::new(None) }
-    }
-
-    /// Shows how much of a stage is done.
-    pub fn set(&self, what: &str, done: u64, total: u64) {
-        let mut bar = self.bar.borrow_mut();
-        if bar.as_ref().is_none_or(|(shown, _)| shown != what) {
-            bar.iter().for_each(|(_, progress)| progress.finish());
-            *bar = Some((what.to_owned(), Progress::new(total, self.quiet)));
-        }
-        if let Some((_, progress)) = bar.as_mut() {
-            progress.set_of(what, done, total);
-        }
-    }
-
-    /// Removes the bar.
-    pub fn finish(&self) {
-        self.bar.borrow().iter().for_each(|(_, progress)| progress.finish());
-    }
 }
 
 /// A table of the points, the findings, and where the results are.

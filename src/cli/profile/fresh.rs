@@ -1,6 +1,7 @@
 //! Runs the frames of a profile.
 use super::Args;
 use crate::cli::files::check_not_of_scene;
+use crate::cli::progress::Stages;
 use crate::cli::{fail_on_messages, render};
 use crate::denoise::filter::{Method, Row};
 use crate::error::{Error, Result};
@@ -9,7 +10,6 @@ use crate::profile::{Measured, Profile, Subject, measure};
 use crate::render::settings::Settings;
 use crate::report::trace::chrome_trace;
 use crate::scene::Scene;
-use indicatif::{ProgressBar, ProgressDrawTarget};
 
 /// Frames that are timed unless a number is given.
 const FRAMES: u16 = 20;
@@ -44,12 +44,15 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     let gpu = args.common.open(args.tracing.unwrap_or_default())?;
     render::check_room(denoise, &settings, &gpu)?;
     let count = usize::from(args.frames.unwrap_or(FRAMES));
-    let bar = ProgressBar::new(2 * count as u64 + 1);
-    if !args.common.talkative() {
-        bar.set_draw_target(ProgressDrawTarget::hidden());
-    }
-    let measured = measure(&gpu, &scene, &settings, filter, count, &mut || bar.inc(1))?;
-    bar.finish_and_clear();
+    let (stages, mut frames) = (Stages::new(!args.common.talkative()), 0);
+    let all = 2 * count as u64 + 1;
+    stages.set("frames", frames, all);
+    let mut frame_is_done = || {
+        frames += 1;
+        stages.set("frames", frames, all);
+    };
+    let measured = measure(&gpu, &scene, &settings, filter, count, &mut frame_is_done)?;
+    stages.finish();
     fail_on_messages(&gpu)?;
     let denoise = filter.map(|row| row.name.to_owned());
     let profile = Profile { denoise, ..Profile::new(&gpu, &args.scene, &scene, &settings, &measured)? };
