@@ -7,7 +7,6 @@ use super::{Demodulation, ExpectedError, Holds, Noisy};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{PackPush, SizePush, vec3, vec4};
-use crate::shaders::shared::noisy;
 use crate::shaders::{demodulate, demodulate_direct, remodulate, remodulate_direct};
 
 /// The kernels and planes of one image.
@@ -92,10 +91,9 @@ impl Demodulated {
     /// stats\[P\], light\[P\], guide\[P\] -> radiance\[P\], variance\[P\], factor\[P\], picture\[P\], direct\[P\]
     pub fn record_split(&self, rec: &mut Recorder, noisy: &Noisy) -> Result<()> {
         let (planes, size, count) = (&self.planes, self.whole().size, self.whole().pixels());
-        let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
         let uncut = self.cut.as_ref().map_or(&planes.radiance, |cut| &cut.whole);
         let bind = demodulate::Bind {
-            noisy: image,
+            noisy: noisy.bind(),
             radiance: self.sparse.as_ref().map_or(uncut, |sparse| &sparse.whole.radiance),
             variance: &self.variance,
             factor: &self.factor,
@@ -110,8 +108,7 @@ impl Demodulated {
             cut.record(rec, planes)?;
         }
         let Some(direct) = &self.direct else { return Ok(()) };
-        let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
-        let bind = demodulate_direct::Bind { noisy: image, direct: &direct.plane };
+        let bind = demodulate_direct::Bind { noisy: noisy.bind(), direct: &direct.plane };
         rec.dispatch_threads(&direct.split, bind, &SizePush { size, ..Default::default() }, count)
     }
 

@@ -115,6 +115,11 @@ impl Noisy {
         })
     }
 
+    /// What the kernels bind that take it apart.
+    pub(super) fn bind(&self) -> noisy::Bind<'_> {
+        noisy::Bind { stats: &self.stats, light: &self.light, guide: &self.guide }
+    }
+
     /// What the planes hold.
     pub fn holds(&self) -> Holds {
         self.holds
