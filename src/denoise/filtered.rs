@@ -41,11 +41,6 @@ impl Recipe<'_> {
         if self.fireflies == Fireflies::Usual && !takes_apart { Fireflies::Off } else { self.fireflies }
     }
 
-    /// Whether what a lens blurs is filtered as it is.
-    pub fn blurred(&self) -> bool {
-        self.method.weighs_noise() && !self.looked_up
-    }
-
     /// What is kept away from the filter of an image that holds this.
     pub fn demodulation(&self, holds: Holds) -> Demodulation {
         match self.method {
@@ -54,6 +49,18 @@ impl Recipe<'_> {
             }
             Method::Oidn => Demodulation::Off,
         }
+    }
+
+    /// Makes what takes images apart that hold the same as this one. Where pixels of it lack direct light, they take it from the others.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the image is too large or the device fails.
+    pub(super) fn demodulated(&self, gpu: &Gpu, noisy: &Noisy) -> Result<Demodulated> {
+        filter::check_size(gpu, noisy.size)?;
+        let demodulation = self.demodulation(noisy.holds());
+        let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
+        let blurred = self.method.weighs_noise() && !self.looked_up;
+        Demodulated::new(gpu, noisy, demodulation, blurred, in_paint, self.fireflies())
     }
 }
 
@@ -102,18 +109,17 @@ impl Filtered {
     /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the image is too large or the
     /// device fails.
     pub fn new(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
-        filter::check_size(gpu, noisy.size)?;
         recipe.method.check_stride(noisy.holds().indirect_stride)?;
-        let demodulation = recipe.demodulation(noisy.holds());
-        let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
-        let parts = Demodulated::new(gpu, &noisy, demodulation, recipe.blurred(), in_painted, recipe.fireflies())?;
+        let parts = recipe.demodulated(gpu, &noisy)?;
         let mut times = run(gpu, |rec| parts.record_split(rec, &noisy))?;
         drop(noisy);
         let removed = parts.removed()?;
         let scales = Scales::of_planes(&parts.planes)?;
         let expected = run_filter(gpu, recipe, &scales, &parts.planes, &mut times)?;
         times.extend(run(gpu, |rec| parts.record_fill(rec))?);
-        if let Some(direct) = parts.direct_planes() {
+        let direct = parts.direct_planes();
+        let in_painted = direct.is_some();
+        if let Some(direct) = direct {
             run_filter(gpu, recipe, &scales.with_light(&direct.radiance)?, &direct, &mut times)?;
             times.extend(run(gpu, |rec| parts.record_direct_join(rec))?);
         }

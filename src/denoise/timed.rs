@@ -1,8 +1,7 @@
 //! One image filtered as [`Filtered`](super::Filtered) does it, to the same bits, but with kernels that have run before: what the
 //! filter costs once its first use is over.
 use super::demodulated::Demodulated;
-use super::demodulation::Demodulation;
-use super::filter::{self, Filter, Method, Planes, Row, Scales, oidn};
+use super::filter::{Filter, Method, Planes, Row, Scales, oidn};
 use super::filtered::{Colour, Recipe, colour};
 use super::noisy::Noisy;
 use crate::error::Result;
@@ -60,11 +59,9 @@ pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
 
 /// The same for Open Image Denoise: its own pass is timed by the host's clock, and loading the library is part of the first run.
 fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
-    filter::check_size(gpu, noisy.size)?;
     let before = gpu.allocated_bytes();
     let begun = Instant::now();
-    let parts =
-        Demodulated::new(gpu, &noisy, recipe.demodulation(noisy.holds()), recipe.blurred(), false, recipe.fireflies())?;
+    let parts = recipe.demodulated(gpu, &noisy)?;
     let compile = begun.elapsed();
     let device_bytes = gpu.allocated_bytes().saturating_sub(before);
     let once = || -> Result<(Vec<PassTime>, Duration)> {
@@ -95,10 +92,7 @@ impl<'a> Chain<'a> {
     /// # Errors
     /// Those of [`timed`].
     pub(crate) fn new(gpu: &'a Gpu, noisy: Noisy, recipe: &Recipe, row: &Row) -> Result<Self> {
-        filter::check_size(gpu, noisy.size)?;
-        let demodulation = recipe.demodulation(noisy.holds());
-        let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
-        let parts = Demodulated::new(gpu, &noisy, demodulation, recipe.blurred(), in_paint, recipe.fireflies())?;
+        let parts = recipe.demodulated(gpu, &noisy)?;
         // The scales that settings count in are those of the light that is filtered.
         gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
         let scales = Scales::of_planes(&parts.planes)?;
