@@ -12,13 +12,17 @@ layout(scalar, binding = 5) writeonly buffer Variance { vec3 traced_variance[]; 
 layout(constant_id = 110) const bool MEASURED = true; // `variance` holds every pixel's
 layout(scalar, push_constant) uniform Push { SparsePush push; };
 
+#include "shared/sampled_albedo.glsl"
 #include "shared/variance_at.glsl"
 
 void main() {
     uint i = thread_index(), width = (push.size.x + push.stride - 1u) / push.stride;
     if (i >= width * ((push.size.y + push.stride - 1u) / push.stride)) return;
     uint whole = i / width * push.stride * push.size.x + i % width * push.stride;
-    traced_radiance[i] = texelFetch(radiance, int(whole));
-    traced_guide[i] = Guide_load(guide, whole);
+    vec4 c = texelFetch(radiance, int(whole));
+    traced_radiance[i] = c;
+    Guide hit = Guide_load(guide, whole);
+    hit.albedo = sampled_albedo(int(whole), c.w, hit.albedo);
+    traced_guide[i] = hit;
     if (MEASURED) traced_variance[i] = variance_at(int(whole));
 }

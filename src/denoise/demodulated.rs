@@ -126,9 +126,9 @@ impl Demodulated {
     /// Direct light for a filter, where it is to be in-painted: what comes out takes the place of the radiance, which must have
     /// been filtered by then.
     pub fn direct_planes(&self) -> Option<Planes> {
-        let Planes { size, radiance, guide, .. } = self.whole();
-        let (guide, output) = (guide.clone(), radiance.clone());
-        let planes = |radiance| Planes { size: *size, radiance, guide, light: None, variance: None, output };
+        let Planes { size, radiance, guide, light, .. } = self.whole();
+        let (guide, light, output) = (guide.clone(), light.clone(), radiance.clone());
+        let planes = |radiance| Planes { size: *size, radiance, guide, light, variance: None, output };
         self.direct.as_ref().map(|d| planes(d.plane.clone()))
     }
 

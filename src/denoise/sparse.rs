@@ -6,7 +6,8 @@
 use super::filter::{FilterInput, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{Guide, NONE, SparsePush, vec3, vec4};
+use crate::layout::{Guide, NONE, PixelLight, SparsePush, vec3, vec4};
+use crate::shaders::shared::sampled_albedo;
 use crate::shaders::upsample::{FARTHEST_APART, RATE};
 use crate::shaders::{decimate, upsample};
 use glam::Vec3;
@@ -18,6 +19,8 @@ pub struct Sparse {
     /// The image.
     pub whole: Planes,
     variance: Buffer<vec3>,
+    /// One element where the image has none.
+    light: Buffer<PixelLight>,
     stride: u32,
 }
 
@@ -41,16 +44,19 @@ impl Sparse {
             size,
             radiance: plane("traced radiance")?,
             guide: Buffer::new(gpu, "guides of traced", pixels, Location::Device)?,
-            light: None,
+            light: None, // its guides have the albedo of the samples
             variance: measured.then(|| variance.clone()),
             output: plane("filtered, traced")?,
         };
-        let constants = decimate::Constants { measured, ..Default::default() };
+        let no_light = || Buffer::new(gpu, "no light", 1, Location::Device);
+        let light = whole.light.clone().map_or_else(no_light, Ok)?;
+        let sampled_albedo = sampled_albedo::Constants { has_light: whole.light.is_some() };
+        let constants = decimate::Constants { measured, sampled_albedo, ..Default::default() };
         let (decimate, upsample) = (Kernel::new(gpu, &constants)?, Kernel::new(gpu, &Default::default())?);
-        Ok((Self { decimate, upsample, whole, variance, stride }, traced))
+        Ok((Self { decimate, upsample, whole, variance, light, stride }, traced))
     }
 
-    /// radiance\[P\], guide\[P\], variance\[P\] -> `radiance`\[T\], guide\[T\], variance\[T\] of the T traced pixels
+    /// radiance\[P\], guide\[P\], light\[P\], variance\[P\] -> `radiance`\[T\], guide\[T\], variance\[T\] of the T traced pixels
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
@@ -58,6 +64,7 @@ impl Sparse {
         let bind = decimate::Bind {
             radiance: &self.whole.radiance,
             guide: &self.whole.guide,
+            sampled_albedo: sampled_albedo::Bind { light: &self.light },
             variance: self.whole.variance.as_ref().unwrap_or(&self.variance),
             traced_radiance: radiance,
             traced_guide: &traced.guide,

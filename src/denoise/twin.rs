@@ -1,6 +1,7 @@
 //! The CPU twin of the kernels of `glsl/film` that take a noisy image apart and put it together, for tests and tools.
 use super::file::Layers;
 use super::filter::FilterInput;
+use super::filter::pixel::{largest, reflects};
 use super::{Demodulation, Holds};
 use crate::image::aov::Aovs;
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
@@ -61,6 +62,14 @@ impl Pixels {
         if sampled { &self.light[i].albedo } else { &self.guide[i].albedo }
     }
 
+    /// Surfaces as filters of this light see them, with the albedo that it was divided by. Twin of `glsl/shared/sampled_albedo.glsl`.
+    fn guide_of(&self, radiance: &[vec4]) -> Vec<Guide> {
+        let has_samples = |i: usize| radiance[i][3] > 0.0 || self.light[i].albedo != [0.0; 3];
+        let albedo =
+            |i: usize| if self.holds.light && has_samples(i) { self.light[i].albedo } else { self.guide[i].albedo };
+        (0..radiance.len()).map(|i| Guide { albedo: albedo(i), ..self.guide[i] }).collect()
+    }
+
     fn sampled(&self, i: usize) -> bool {
         self.count(i) > 0.0 && self.stats[i].mean.iter().all(|v| v.is_finite())
     }
@@ -101,9 +110,12 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
     let sharp_variance = all.clone().map(rest).collect();
     let variance = variance.map(|v| v.into_iter().zip(&factor).map(|(v, f)| with_unreflected(v, f)).collect());
     let [width, height] = pixels.size;
-    let radiance = all.map(radiance).collect();
-    let input = FilterInput { width, height, radiance, guide: pixels.guide.clone(), variance };
-    let direct = in_paint.then(|| input.with_radiance(demodulate_direct(pixels)));
+    let radiance: Vec<vec4> = all.map(radiance).collect();
+    let input = FilterInput { width, height, guide: pixels.guide_of(&radiance), radiance, variance };
+    let direct = in_paint.then(|| {
+        let radiance = demodulate_direct(pixels);
+        FilterInput { guide: pixels.guide_of(&radiance), ..input.with_radiance(radiance) }
+    });
     Parts { input, sharp: parts.iter().map(|p| p.sharp).collect(), factor, sharp_variance, direct }
 }
 
@@ -244,18 +256,9 @@ fn divisor(albedo: &vec3) -> vec3 {
     albedo.map(|v| number(v).max(SMALLEST_ALBEDO))
 }
 
-fn reflects(albedo: &vec3) -> bool {
-    largest(albedo) > SMALLEST_ALBEDO
-}
-
 /// 0 for what is no number: nothing would mend it later.
 fn number(v: f32) -> f32 {
     if v.is_finite() { v } else { 0.0 }
-}
-
-/// 0 for what is no number.
-fn largest(v: &vec3) -> f32 {
-    v.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max)
 }
 
 /// Beside something brighter that reflects nothing, and partly of it.

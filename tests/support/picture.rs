@@ -40,7 +40,8 @@ pub fn flat(width: u32, height: u32) -> FilterInput {
     FilterInput { guide, ..clean(width, height) }
 }
 
-/// The same with exponential noise of the mean's size, the samples' variance beside it, 1 to 7 samples, and every 13th pixel without.
+/// The same with exponential noise of the mean's size, the samples' variance beside it, 1 to 7 samples, and every 13th pixel without;
+/// with surfaces of 50 albedos, one of which is none.
 pub fn noisy(width: u32, height: u32) -> FilterInput {
     let mut input = clean(width, height);
     let mut variance = Vec::new();
@@ -49,6 +50,9 @@ pub fn noisy(width: u32, height: u32) -> FilterInput {
         let u = (hash(i as u32) as f32 + 0.5) / 4_294_967_296.0;
         let scale = -u.max(1e-6).ln();
         *c = [c[0] * scale, c[1] * scale, c[2] * scale, if i % 13 == 12 { 0.0 } else { (1 + i % 7) as f32 }];
+    }
+    for (i, g) in (0..).zip(&mut input.guide).filter(|(_, g)| g.material != NONE) {
+        g.albedo = [0.02 * (hash(i) % 50) as f32; 3];
     }
     FilterInput { variance: Some(variance), ..input }
 }

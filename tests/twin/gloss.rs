@@ -135,3 +135,31 @@ fn auto_leaves_no_specks_where_samples_are_dark_by_chance() {
     assert!(shares[..2].iter().all(|share| *share < 0.015) && shares[2] > 0.15, "{shares:?}");
     assert_silent(&gpu);
 }
+
+/// A plate with a texture below a gloss that shows a lamp: a base of albedo a, which light of 1 falls on, and a gloss of .04 that shows
+/// light of 5. Divided by the albedo A = a + .04 of both it is (a + .2) / A = 1 + .16 / A: a guide that tells A tells the light.
+#[test]
+fn the_texture_below_a_gloss_is_not_left_in_its_light() {
+    let (gpu, auto, mut input) = (gpu(), find("auto").unwrap(), plate(16, false));
+    let random = |i: u32| hash(i) as f32 / u32::MAX as f32;
+    let albedo = |i: u32| 0.16 + 0.6 * random(i % SIZE[0] / 3).powi(2); // of stripes
+    let truth = |i: u32| 1.0 + 0.16 / albedo(i);
+    let noise = |i: u32| 0.6 * (0..4).map(|k| random(9 * i + k + 1000) - 0.5).sum::<f32>(); // of variance .6^2 / 3
+    for i in 0..SIZE[0] * SIZE[1] {
+        let light = truth(i) + noise(i);
+        input.radiance[i as usize] = [light, light, light, 16.0];
+        input.variance.as_mut().unwrap()[i as usize] = [0.12; 3];
+    }
+    let error = |told: &dyn Fn(u32) -> f32| {
+        let mut input = input.clone();
+        for (i, g) in (0..).zip(&mut input.guide) {
+            g.albedo = [told(i); 3];
+        }
+        let output = run(&gpu, auto, &input, &FilterSettings::default().scaled_to(&input)).unwrap().0;
+        (0..).zip(&output).map(|(i, c)| (c[0] - truth(i)).powi(2)).sum::<f32>() / output.len() as f32
+    };
+    let [told, untold] = [error(&albedo), error(&|_| 0.5)];
+    println!("{told:.6} {untold:.6}");
+    assert!(told < 0.3 * untold, "{told} of {untold}");
+    assert_silent(&gpu);
+}

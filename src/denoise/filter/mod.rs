@@ -15,7 +15,7 @@ mod noise_estimate;
 mod none;
 pub(super) mod oidn;
 mod pack;
-mod pixel;
+pub(super) mod pixel;
 mod readers;
 mod scales;
 mod settings;

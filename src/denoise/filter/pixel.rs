@@ -1,6 +1,7 @@
 //! What the filters make of a pixel before they trust it. Twin of `glsl/shared/sanitise.glsl`.
 use crate::layout::{vec3, vec4};
 use crate::math::octahedral::{octahedral_point, octahedral_vector};
+use crate::shaders::shared::albedo::SMALLEST_ALBEDO;
 pub use crate::shaders::shared::sanitise::{FARTHEST, LARGEST, WIDEST};
 use glam::{Vec2, Vec3};
 
@@ -33,4 +34,14 @@ pub fn known_normal(normal: vec3) -> Vec3 {
 /// Channel of a guide in single precision that squares and products can be taken of; 0 where there is none.
 pub fn known_channel(value: f32) -> f32 {
     if value.is_finite() { value.clamp(-WIDEST, WIDEST) } else { 0.0 }
+}
+
+/// Whether light of this albedo is divided by it. Twin of `glsl/shared/albedo.glsl`.
+pub fn reflects(albedo: &vec3) -> bool {
+    largest(albedo) > SMALLEST_ALBEDO
+}
+
+/// 0 for what is no number.
+pub fn largest(v: &vec3) -> f32 {
+    v.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max)
 }

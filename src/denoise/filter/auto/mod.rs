@@ -9,7 +9,7 @@ use smoothing::Smoothing;
 
 use super::atrous_taps::threads;
 use super::edge::{EdgeSettings, Rates};
-use super::guided::{self, GuidedSums, Packed, Windows};
+use super::guided::{self, Channels, GuidedSums, Packed, Windows};
 use super::noise_estimate::Estimate;
 use super::pack::Pack;
 use super::svgf::Levels;
@@ -60,6 +60,11 @@ fn candidates(s: &FilterSettings) -> [FilterSettings; 4] {
             s.edge.sigma_x = sigma_x;
         }),
     ]
+}
+
+/// What all windows are guided by. Light that was not divided by the albedo follows it as well.
+fn guide_of_windows(settings: &FilterSettings) -> Channels {
+    Channels::new(settings.guided.channels, settings.edge.extent).with_albedo()
 }
 
 /// Pixels of the narrow window over those of the wide and of the middle one.
@@ -126,7 +131,7 @@ impl Auto {
         let pixels = pack.colour.len();
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let [wide, middle, narrow, of_svgf] = candidates(settings);
-        let windows_pack = Packed::new(gpu, settings.guided.channels, settings.edge.extent, size)?;
+        let windows_pack = Packed::new(gpu, guide_of_windows(settings), size)?;
         let surfaces = Rates::of_surfaces(&settings.edge).constants();
         let local_size_x = gpu.tuning().filter_workgroup;
         let windows =

@@ -1,7 +1,7 @@
 //! `auto` on the host: the twin of `glsl/auto/*.comp`.
 use super::residual::given_back;
 use super::smoothing::Cells;
-use super::{candidates, floor, shares};
+use super::{candidates, floor, guide_of_windows, shares};
 use crate::denoise::filter::edge::{Rates, edge_weight};
 use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast, own_variance};
 use crate::denoise::filter::pack::Packed;
@@ -34,10 +34,10 @@ struct Results {
 
 impl Results {
     fn new(input: &FilterInput, image: &[Packed], settings: &FilterSettings) -> Self {
-        let rows = candidates(settings);
+        let (rows, guide) = (candidates(settings), guide_of_windows(settings));
         let run = |k: usize, radiance: Vec<vec4>| -> Vec<Vec4> {
-            let FilterSettings { guided, footprint, edge, .. } = &rows[k];
-            let output = guided::fits(&input.with_radiance(radiance), guided, footprint.radius, edge.extent);
+            let FilterSettings { guided, footprint, .. } = &rows[k];
+            let output = guided::fits(&input.with_radiance(radiance), guided, footprint.radius, guide);
             output.into_iter().map(Vec4::from).collect()
         };
         let pixels = |colour: &dyn Fn(usize) -> Vec3| -> Vec<vec4> {
@@ -47,12 +47,8 @@ impl Results {
         let dim = |i: usize| dimmed(image[i].colour, wide[i].xyz());
         let [wide_dim, narrow] = [0, 2].map(|k| run(k, pixels(&dim)));
         let added = |i: usize| probe(i, wide[i].xyz(), floor(settings));
-        let of_narrow = guided::leverages(
-            &input.with_radiance(pixels(&dim)),
-            &rows[2].guided,
-            rows[2].footprint.radius,
-            rows[2].edge.extent,
-        );
+        let of_narrow =
+            guided::leverages(&input.with_radiance(pixels(&dim)), &rows[2].guided, rows[2].footprint.radius, guide);
         // The probe does not change what is known of noise.
         let noise = noise_estimate::reference(input, image, &rows[3].edge, false);
         let (size, s) = (input.size(), &rows[3]);

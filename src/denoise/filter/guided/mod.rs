@@ -12,7 +12,7 @@ use crate::layout::{GuidedPush, float, vec4};
 use crate::settings::{Is, choices, settings};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_rows, shared};
 use crate::threads::both;
-pub use pack::{BESIDE, Packed};
+pub use pack::{BESIDE, Channels, Packed};
 pub use reference::{fits, leverages};
 use table::GuidedTable;
 
@@ -24,14 +24,17 @@ pub const ROW: Row = Row {
     weighs_noise: false,
     make: |gpu, s, size| {
         let (own, radius) = (&s.guided, s.footprint.radius);
-        let pack = Packed::new(gpu, own.channels, s.edge.extent, size)?;
+        let pack = Packed::new(gpu, Channels::new(own.channels, s.edge.extent), size)?;
         let fits: Box<dyn Filter> = match own.sums {
             GuidedSums::Blocks => Box::new(Fits { windows: Windows::new(gpu, radius, own.eps, false, size)?, pack }),
             GuidedSums::Table => Box::new(GuidedTable::new(gpu, pack, radius, own.eps, size)?),
         };
         Ok(Box::new(Guided { fits, light: AsLight::new(gpu)? }))
     },
-    reference: |input, s| as_light(input, fits(input, &s.guided, s.footprint.radius, s.edge.extent)),
+    reference: |input, s| {
+        let channels = Channels::new(s.guided.channels, s.edge.extent);
+        as_light(input, fits(input, &s.guided, s.footprint.radius, channels))
+    },
 };
 
 /// `vec4`s of a pixel's record in a strip.

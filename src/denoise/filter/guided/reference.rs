@@ -1,7 +1,7 @@
 //! The guided filter on the host, window by window: the twin of both of its forms on a device.
-use super::{GuidedSettings, GuidedSums, step};
+use super::{Channels, GuidedSettings, GuidedSums, step};
 use crate::denoise::filter::FilterInput;
-use crate::denoise::filter::pixel::{known_channel, known_radiance};
+use crate::denoise::filter::pixel::known_radiance;
 use crate::layout::{Guide, vec4};
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
@@ -34,11 +34,9 @@ struct Image<'a> {
 }
 
 impl<'a> Image<'a> {
-    fn new(input: &'a FilterInput, own: &'a GuidedSettings, radius: u32, extent: f32) -> Self {
-        let pixel = |(c, g): (&vec4, &Guide)| Pixel {
-            colour: known_radiance(*c).map(|c| c.as_dvec3()),
-            guide: channels(g, own.channels, extent),
-        };
+    fn new(input: &'a FilterInput, own: &'a GuidedSettings, radius: u32, channels: Channels) -> Self {
+        let pixel =
+            |(c, g): (&vec4, &Guide)| Pixel { colour: known_radiance(*c).map(|c| c.as_dvec3()), guide: channels.of(g) };
         let pixels = input.radiance.iter().zip(&input.guide).map(pixel).collect();
         let size = input.size();
         let step = if own.sums == GuidedSums::Table { 1 } else { step(radius) };
@@ -64,8 +62,8 @@ impl<'a> Image<'a> {
 }
 
 /// Window by window, in double precision: the definition. Beside edges fits may be negative.
-pub fn fits(input: &FilterInput, own: &GuidedSettings, radius: u32, extent: f32) -> Vec<vec4> {
-    let image = Image::new(input, own, radius, extent);
+pub fn fits(input: &FilterInput, own: &GuidedSettings, radius: u32, channels: Channels) -> Vec<vec4> {
+    let image = Image::new(input, own, radius, channels);
     let model = |block: usize| image.sums(block).map(Sums::model);
     let models: Vec<Option<Model>> =
         (0..(image.blocks[0] * image.blocks[1]) as usize).into_par_iter().map(model).collect();
@@ -89,8 +87,8 @@ pub fn fits(input: &FilterInput, own: &GuidedSettings, radius: u32, extent: f32)
 
 /// The derivative of every pixel's value in the model of the window around it by its own value; at least the mean of that of the
 /// window's pixels.
-pub fn leverages(input: &FilterInput, own: &GuidedSettings, radius: u32, extent: f32) -> Vec<f32> {
-    let image = Image::new(input, own, radius, extent);
+pub fn leverages(input: &FilterInput, own: &GuidedSettings, radius: u32, channels: Channels) -> Vec<f32> {
+    let image = Image::new(input, own, radius, channels);
     let leverage = |at: usize| {
         image.sums(image.block_of(at)).map_or(1.0, |sums| {
             let off = image.pixels[at].guide - sums.mean_guide;
@@ -99,17 +97,6 @@ pub fn leverages(input: &FilterInput, own: &GuidedSettings, radius: u32, extent:
         })
     };
     (0..image.pixels.len()).into_par_iter().map(leverage).collect()
-}
-
-fn channels(g: &Guide, channels: u32, extent: f32) -> DVec4 {
-    let n = glam::Vec3::from(g.normal.map(known_channel)) * 0.5;
-    let depth = known_channel(g.depth * (1.0 / extent));
-    match channels {
-        1 => glam::vec4((n.x + n.y + n.z) / 3.0, 0.0, 0.0, 0.0),
-        3 => n.extend(0.0),
-        _ => n.extend(depth),
-    }
-    .as_dvec4()
 }
 
 /// Indices of the blocks of a window, clipped to the image.
@@ -192,7 +179,8 @@ mod tests {
     fn in_threes(depth: impl Fn(usize) -> f32, eps: f32) -> Vec<f32> {
         let guide = (0..5).map(|i| Guide { depth: depth(i), ..Default::default() }).collect();
         let input = FilterInput { width: 5, height: 1, radiance: vec![[1.0; 4]; 5], guide, variance: None };
-        leverages(&input, &GuidedSettings { eps: [eps; 4], ..Default::default() }, 1, 1.0)
+        let settings = GuidedSettings { eps: [eps; 4], ..Default::default() };
+        leverages(&input, &settings, 1, Channels::new(settings.channels, 1.0))
     }
 
     fn close(found: &[f32], right: [f32; 5]) -> bool {
