@@ -51,7 +51,8 @@ pub struct Tuning {
     pub triangles_a_step: u32,
     /// Whether paths are traced by a wavefront, see `render::pass::wavefront`, in scenes of more than a few nodes and where they have
     /// at most 32 edges. Tracing alone needs half of the registers of whole paths; a path takes 176 bytes. An H200 takes .89 (bare
-    /// Sponza) to .45 (pine grove) of the time; lavapipe takes 1.6 to 3.8 of it. Not with ray queries, by which no GPU was measured.
+    /// Sponza) to .45 (pine grove) of the time; lavapipe takes 1.6 to 3.8 of it. Not with ray queries, by which no GPU was
+    /// measured. By a wavefront, nothing tells of rays that a driver on a CPU has ended early.
     pub wavefront: bool,
     /// Threads in a workgroup of a filter that looks at pixels around its own, all in one row. In larger ones neighbours share
     /// more of what they read. With 128 in place of 32 an H200 takes .85 (`wavelet`), .97 (`svgf`) and .99 to 1.00 of the time.
