@@ -1,7 +1,7 @@
 //! The CPU twin of the kernels of `glsl/film` that take a noisy image apart and put it together, for tests and tools.
 use super::file::Layers;
 use super::filter::FilterInput;
-use super::filter::pixel::{largest, reflects};
+use super::filter::pixel::{largest, reflects, sampled_albedo};
 use super::{Demodulation, Holds};
 use crate::image::aov::Aovs;
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
@@ -62,11 +62,12 @@ impl Pixels {
         if sampled { &self.light[i].albedo } else { &self.guide[i].albedo }
     }
 
-    /// Surfaces as filters of this light see them, with the albedo that it was divided by. Twin of `glsl/shared/sampled_albedo.glsl`.
+    /// Surfaces as filters of this light see them, with the albedo that it was divided by.
     fn guide_of(&self, radiance: &[vec4]) -> Vec<Guide> {
-        let has_samples = |i: usize| radiance[i][3] > 0.0 || self.light[i].albedo != [0.0; 3];
-        let albedo =
-            |i: usize| if self.holds.light && has_samples(i) { self.light[i].albedo } else { self.guide[i].albedo };
+        let albedo = |i: usize| match self.holds.light {
+            true => sampled_albedo(&self.light[i], radiance[i][3], self.guide[i].albedo),
+            false => self.guide[i].albedo,
+        };
         (0..radiance.len()).map(|i| Guide { albedo: albedo(i), ..self.guide[i] }).collect()
     }
 

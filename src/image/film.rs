@@ -74,7 +74,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Width and height.
+    /// Width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }
@@ -117,7 +117,7 @@ impl Film {
         Self { width, height, ..Self::default() }
     }
 
-    /// Width and height.
+    /// Width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }

@@ -21,7 +21,7 @@ pub struct FilterInput {
 }
 
 impl FilterInput {
-    /// Width and height.
+    /// Width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }

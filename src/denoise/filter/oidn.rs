@@ -1,5 +1,6 @@
 //! Open Image Denoise, the learned filter that others are measured against. It runs on the host's processor, where it is installed.
 use super::Planes;
+use super::pixel::sampled_albedo;
 use crate::error::Result;
 use crate::gpu::{Oidn, OidnInput, Texels};
 use crate::layout::{Guide, vec3, vec4};
@@ -71,7 +72,7 @@ fn read_guide(planes: &Planes) -> Result<Vec<Guide>> {
     let mut guide = planes.guide.read()?;
     let Some(light) = &planes.light else { return Ok(guide) };
     for ((guide, light), radiance) in guide.iter_mut().zip(light.read()?).zip(planes.radiance.read()?) {
-        guide.albedo = if radiance[3] > 0.0 { light.albedo } else { guide.albedo };
+        guide.albedo = sampled_albedo(&light, radiance[3], guide.albedo);
     }
     Ok(guide)
 }

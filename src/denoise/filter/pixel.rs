@@ -1,5 +1,5 @@
 //! What the filters make of a pixel before they trust it. Twin of `glsl/shared/sanitise.glsl`.
-use crate::layout::{vec3, vec4};
+use crate::layout::{PixelLight, vec3, vec4};
 use crate::math::octahedral::{octahedral_point, octahedral_vector};
 use crate::shaders::shared::albedo::SMALLEST_ALBEDO;
 pub use crate::shaders::shared::sanitise::{FARTHEST, LARGEST, WIDEST};
@@ -34,6 +34,12 @@ pub fn known_normal(normal: vec3) -> Vec3 {
 /// Channel of a guide in single precision that squares and products can be taken of; 0 where there is none.
 pub fn known_channel(value: f32) -> f32 {
     if value.is_finite() { value.clamp(-WIDEST, WIDEST) } else { 0.0 }
+}
+
+/// The albedo that the light of a pixel was divided by: that of its samples or, without any, of the ray through its centre. Light that is
+/// no number has a count of 0, too, but samples. Twin of `glsl/shared/sampled_albedo.glsl`.
+pub fn sampled_albedo(light: &PixelLight, count: f32, of_centre: vec3) -> vec3 {
+    if count > 0.0 || light.albedo != [0.0; 3] { light.albedo } else { of_centre }
 }
 
 /// Whether light of this albedo is divided by it. Twin of `glsl/shared/albedo.glsl`.
