@@ -234,13 +234,13 @@ fn renderer(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings) -> Resul
 /// A system that is out of memory ends the process hours later without a word; what the filter cannot bind is told before, too.
 ///
 /// # Errors
-/// [`Error::Device`].
+/// [`Error::Memory`], and [`Error::Device`] for what the filter cannot bind.
 pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Result<()> {
     let (size, unified) = (settings.size(), gpu.info().unified);
     let while_filtered = denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
     let bytes = film::host_bytes(settings, unified).max(while_filtered);
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);
-    memory::check_beside_driver(bytes).map_err(|what| Error::Device(refused(what)))?;
+    memory::check_beside_driver(bytes).map_err(|what| Error::Memory(refused(what)))?;
     if denoise.is_some() {
         filter::check_size(gpu, size)?;
     }
