@@ -173,11 +173,39 @@ fn explain(message: &str) -> String {
         m => return m.replace('\n', " "),
     };
     let (unknown, known) = quoted.split_first().unwrap_or((&"", &[]));
-    match nearest(unknown, known.iter().copied()) {
-        Some(near) => format!("unknown {kind} \"{unknown}\": did you mean \"{near}\"? Known: {}", known.join(", ")),
-        None => format!("unknown {kind} \"{unknown}\""),
-    }
+    let hint = hint(unknown, known).map_or_else(|| ".".to_owned(), |hint| format!(": {hint}"));
+    let known = if known.is_empty() { String::new() } else { format!(" Known: {}", known.join(", ")) };
+    format!("unknown {kind} \"{unknown}\"{hint}{known}")
 }
+
+/// What a word stands for that is not among the known ones: what other renderers call so, or the known one most like it.
+fn hint(unknown: &str, known: &[&str]) -> Option<String> {
+    let of = |value| known.contains(&value);
+    let elsewhere = match unknown {
+        "area" | "rect" | "quad" | "disk" if of("directional") => {
+            return Some("what shines from an area is a mesh whose material has an emission.".to_owned());
+        }
+        "infinite" | "envmap" | "sky" | "dome" if of("directional") => {
+            return Some("what shines from all around is the table [environment].".to_owned());
+        }
+        "color" | "power" | "energy" | "strength" if of("irradiance") => {
+            return Some("a light has an intensity, or an irradiance where it is directional.".to_owned());
+        }
+        "sun" | "distant" => "directional",
+        "matte" | "lambertian" => "diffuse",
+        "metal" => "conductor",
+        "glass" => "dielectric",
+        "plastic" => "coated",
+        "pbr" | "principled" | "disney" => "metallic-roughness",
+        _ => unknown,
+    };
+    let word = if of(elsewhere) { elsewhere } else { unknown };
+    let near = nearest(word, known.iter().copied())?;
+    (strsim::jaro_winkler(word, near) >= LEAST_LIKENESS).then(|| format!("did you mean \"{near}\"?"))
+}
+
+/// Words that are less alike, from 0 to 1, are not taken for one another: "sun" and "render" have .5.
+const LEAST_LIKENESS: f64 = 0.7;
 
 /// The name that is most like `word`.
 pub(super) fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
@@ -204,6 +232,28 @@ mod tests {
                 .contains("line 3: unknown key \"colour\": did you mean \"color\"")
         );
         assert!(error("[[mesh]]\ntransform = { scael = 2 }").contains("did you mean \"scale\""));
+    }
+
+    #[test]
+    fn words_of_other_renderers_are_known() {
+        for (table, words, hint) in [
+            ("light", ["sun", "distant"], "did you mean \"directional\"? Known: point, spot, directional"),
+            ("light", ["area", "quad"], "what shines from an area is a mesh whose material has an emission. Known:"),
+            ("light", ["sky", "infinite"], "what shines from all around is the table [environment]. Known: point"),
+            ("material", ["glass", "dielectrc"], "did you mean \"dielectric\"? Known: diffuse, conductor"),
+            ("material", ["principled", "disney"], "did you mean \"metallic-roughness\"?"),
+            // Nothing is like these.
+            ("light", ["xyz", "fog"], ". Known: point, spot, directional"),
+        ] {
+            for word in words {
+                let found = error(&format!("[[{table}]]\ntype = \"{word}\"\n"));
+                let rest = found.strip_prefix(&format!("s.toml, line 2: unknown value \"{word}\"")).unwrap();
+                assert!(rest.trim_start_matches(": ").starts_with(hint), "{found}");
+            }
+        }
+        assert!(!error("[[material]]\nglass = 1").contains("dielectric"));
+        assert!(error("[[light]]\ncolor = 1").contains("unknown key \"color\": a light has an intensity, or"));
+        assert!(error("[[sun]]\n").starts_with("s.toml, line 1: unknown key \"sun\". Known: film, camera"));
     }
 
     #[test]
