@@ -49,19 +49,9 @@ impl Common {
         !self.quiet && !self.json
     }
 
-    /// Prints what is odd, unless only the result is wanted.
-    pub fn warn(&self, warnings: &[String]) {
-        if self.talkative() {
-            warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
-        }
-    }
-
-    /// Warns of options that were given and change nothing, because `name`, the policy or filter that was chosen, does not read them.
-    pub fn warn_of_unread(&self, given: &[String], name: &str, reads: impl Fn(&str) -> bool) {
-        let unread = given.iter().filter(|option| !reads(option));
-        self.warn(
-            &unread.map(|option| format!("--{option} changes nothing: {name} does not read it")).collect::<Vec<_>>(),
-        );
+    /// Takes warnings, and prints each unless only the result is wanted.
+    pub fn warnings(&self) -> Warnings {
+        Warnings { is_printed: self.talkative(), all: Vec::new() }
     }
 
     /// Prints what a command found: `found` as JSON or `text`, or nothing.
@@ -88,6 +78,35 @@ impl Common {
     pub fn open(&self, tracing: Tracing) -> Result<Gpu> {
         let (device, validation, cache) = (self.device.clone(), self.validation, gpu::cache_folder());
         Gpu::open(&DeviceOptions { device, validation, cache, tracing, ..DeviceOptions::default() })
+    }
+}
+
+/// What a command has warned of so far: lines on stderr, and a list in its JSON.
+pub struct Warnings {
+    is_printed: bool,
+    all: Vec<String>,
+}
+
+impl Warnings {
+    /// Warns of what is odd.
+    pub fn add(&mut self, warnings: impl IntoIterator<Item = String>) {
+        for warning in warnings {
+            if self.is_printed {
+                complain(&format!("warning: {warning}"));
+            }
+            self.all.push(warning);
+        }
+    }
+
+    /// Warns of options that were given and change nothing, because `name`, the policy or filter that was chosen, does not read them.
+    pub fn add_unread(&mut self, given: Vec<String>, name: &str, reads: impl Fn(&str) -> bool) {
+        let unread = given.into_iter().filter(|option| !reads(option));
+        self.add(unread.map(|option| format!("--{option} changes nothing: {name} does not read it")));
+    }
+
+    /// All of them, in the order in which they came.
+    pub fn into_all(self) -> Vec<String> {
+        self.all
     }
 }
 

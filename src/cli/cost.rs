@@ -32,8 +32,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     let path = args.scene.as_deref().ok_or_else(no_scene)?;
     let gpu = args.common.open(args.tracing)?;
     let (scene, points) = Points::new(args, path, &gpu)?;
-    let warnings = [&scene.warnings[..], &points.notes].concat();
-    args.common.warn(&warnings);
+    let mut warnings = args.common.warnings();
+    warnings.add([&scene.warnings[..], &points.notes].concat());
+    let warnings = warnings.into_all();
     let plan = plan(args, path, &scene, points, &gpu)?;
     let key = key(&gpu, &scene, &plan);
     measured(args, &gpu, &key, &warnings, |earlier, watch| measure(&gpu, &scene, &plan, earlier, watch))

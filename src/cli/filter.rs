@@ -104,6 +104,8 @@ pub struct Summary {
     pub before: Option<Metrics>,
     /// Metrics of the filtered image, in the same way.
     pub after: Option<Metrics>,
+    /// What is odd in the options.
+    pub warnings: Vec<String>,
 }
 
 /// Runs the subcommand.
@@ -113,7 +115,8 @@ pub struct Summary {
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     check_filter(args)?;
-    args.common.warn_of_unread(&args.overrides.given.given(), args.filter.name(), |option| args.filter.reads(option));
+    let mut warnings = args.common.warnings();
+    warnings.add_unread(args.overrides.given.given(), args.filter.name(), |option| args.filter.reads(option));
     let file = Unread::open(&args.image)?;
     let gpu = args.common.open(Tracing::Auto)?;
     check_room(args, &gpu, &file.claim)?;
@@ -139,6 +142,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         passes: table::summarise(&times),
         before: distance(&noisy),
         after: distance(&clean.shown),
+        warnings: warnings.into_all(),
     };
     args.common.report(&summary, || text(args, &summary))?;
     files.check()?;

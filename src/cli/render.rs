@@ -8,7 +8,7 @@ mod taken;
 
 use super::checkpoint;
 use super::choices::Choices;
-use super::common::{Common, PngOptions};
+use super::common::{Common, PngOptions, Warnings};
 use super::files::Files;
 use super::overrides::Overrides;
 use super::{Exit, complain};
@@ -144,27 +144,27 @@ pub fn run(args: &Args) -> Result<Exit> {
     outputs::check_with(args, &scene)?;
     let asked = settings.clone();
     let settings = plan.as_ref().map_or(Ok(settings), |plan| planned::settings(args, plan, &scene))?;
-    warn_of_unread(args, &settings);
+    let mut warnings = args.common.warnings();
+    warn_of_unread(args, &settings, &mut warnings);
     let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
-    args.common.warn(&scene.warnings);
+    warnings.add(scene.warnings.clone());
     let filtered = earlier.as_ref().and_then(|earlier| earlier.filtered.as_ref());
     if let Some(filter) = filtered.filter(|_| args.denoise.is_none_or(Method::is_none)) {
-        args.common.warn(&[format!(
-            "the resumed image was filtered ({filter}), and this one will not be: add --denoise {filter}"
-        )]);
+        let will = format!("and this one will not be: add --denoise {filter}");
+        warnings.add([format!("the resumed image was filtered ({filter}), {will}")]);
     }
     let gpu = host.time("open device", || args.common.open(args.tracing))?;
     let plan = match plan {
         Some(plan) => Some(plan),
-        None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
+        None => host.time("plan", || planned::make(args, &gpu, &scene, &settings, &mut warnings))?,
     };
     let (args, settings) = &planned::applied(args, settings, plan.as_ref())?;
-    warn_of_unplaced(args, settings);
+    warn_of_unplaced(settings, &mut warnings);
     if let Some(method) = args.denoise {
         method.check()?;
     }
     check_room(args.filter(settings), settings, &gpu)?;
-    check_stride(args, settings)?;
+    check_stride(args, settings, &mut warnings)?;
     tell_of_lens(args, &scene);
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, settings))?;
     if args.checkpoint.is_some() && !renderer.can_resume() {
@@ -174,7 +174,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
     let files = Files::new(args.resume.as_deref());
-    let taken = shoot(args, &gpu, &scene, job, files, host)?;
+    let taken = shoot(args, &gpu, job, files, host)?;
     let can_resume = renderer.can_resume();
     // The film is all that is left to write and to filter, and large films need the memory.
     drop(renderer);
@@ -182,6 +182,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         complain("interrupted before the first sample: nothing was written");
         return Ok(Exit::Interrupted);
     };
+    taken.has_warned_of(warnings);
     taken.resumes_by(plan.as_ref().map_or_else(String::new, |plan| planned::instead(plan, &asked)));
     let written = taken.finish(args, plan.as_ref(), true)?;
     if !taken.is_whole() {
@@ -248,16 +249,16 @@ pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Re
 }
 
 /// Tells which settings the policy, that of the scene file or of the options, does not read. A plan chooses the policy itself.
-pub fn warn_of_unread(args: &Args, settings: &Settings) {
+pub fn warn_of_unread(args: &Args, settings: &Settings, warnings: &mut Warnings) {
     let policy = settings.allocate.policy;
     if args.time.is_some() || args.error.is_some() {
         return;
     }
-    args.common.warn_of_unread(&args.overrides.allocate.given(), policy.name, |option| policy.reads(option));
+    warnings.add_unread(args.overrides.allocate.given(), policy.name, |option| policy.reads(option));
 }
 
 /// Tells where other settings leave a policy no samples to place. Where samples are carried from frame to frame they count, too.
-pub fn warn_of_unplaced(args: &Args, settings: &Settings) {
+pub fn warn_of_unplaced(settings: &Settings, warnings: &mut Warnings) {
     let Allocate { policy, min_spp, max_spp, noise_threshold, .. } = settings.allocate.clone();
     let (spp, name) = (settings.spp, policy.name);
     if noise_threshold > 0.0 || settings.allocate.is_even() {
@@ -270,20 +271,18 @@ pub fn warn_of_unplaced(args: &Args, settings: &Settings) {
     } else {
         return;
     };
-    args.common.warn(&[told]);
+    warnings.add([told]);
 }
 
 /// Of light that is not traced for every pixel a picture can be made by some filters alone.
 ///
 /// # Errors
-/// [`Error::Usage`] for another filter; without any a line tells what is left to do.
-pub fn check_stride(args: &Args, settings: &Settings) -> Result<()> {
+/// [`Error::Usage`] for another filter; without any a warning tells what is left to do.
+pub fn check_stride(args: &Args, settings: &Settings, warnings: &mut Warnings) -> Result<()> {
     let stride = settings.indirect_stride;
-    if args.denoise.is_none() && stride > 1 && args.common.talkative() {
-        complain(&format!(
-            "warning: {}: add --denoise, or use tallow filter on the .exr",
-            filter::missing_light(stride)
-        ));
+    if args.denoise.is_none() && stride > 1 {
+        let missing = filter::missing_light(stride);
+        warnings.add([format!("{missing}: add --denoise, or use tallow filter on the .exr")]);
     }
     if let Some(method) = args.denoise {
         method.check_stride(stride)?;

@@ -70,6 +70,20 @@ fn options_that_change_nothing_are_told() {
     let told = "warning: --levels changes nothing: bilateral does not read it\n";
     assert_eq!(warned(&format!("{filter} bilateral --levels 3 --radius 4")), told);
     assert_eq!(warned(&format!("{filter} atrous --levels 3 --conserve-energy")), "");
+    let listed = |words: &str| {
+        let words: Vec<_> = words.split_whitespace().chain(["--json"]).collect();
+        serde_json::from_value::<Vec<String>>(json(&folder, &words)["warnings"].take()).unwrap().join("; ")
+    };
+    let unread = "--window changes nothing: uniform does not read it";
+    assert_eq!(listed(&format!("{small} --window 3")), unread);
+    let unplaced = "min-spp is 4: spp, 4, leaves no samples that both could place";
+    assert_eq!(listed(&format!("{small} --allocate both --min-spp 4")), unplaced);
+    let sparse = listed(&format!("{small} --indirect-stride 2"));
+    assert!(sparse.contains("add --denoise"), "{sparse}");
+    assert!(listed(&frames.replace("--allocate both", "--window 3")).contains(unread));
+    assert!(listed(&format!("{frames} --reproject off")).contains("min-spp is 2"));
+    let cut = listed(&format!("{filter} bilateral --levels 3 --radius 4"));
+    assert_eq!(cut, "--levels changes nothing: bilateral does not read it");
 }
 
 #[test]

@@ -37,7 +37,7 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     let scene = file.load()?.scene;
     let outputs: Vec<_> = args.outputs().map(|(option, path)| (option, path.to_owned())).collect();
     check_not_of_scene(&outputs, &scene)?;
-    args.common.warn(&scene.warnings);
+    args.common.warnings().add(scene.warnings.clone());
     if let Some(old) = old {
         check_beside(old, &scene, &settings, filter)?;
     }

@@ -1,5 +1,6 @@
 //! `--time`, `--error` and `--plan`: a render whose samples and filter are planned, or were planned by an earlier one.
 use super::{Args, check_room};
+use crate::cli::common::Warnings;
 use crate::cli::files::Item;
 use crate::denoise::filter::Method;
 use crate::error::{Checked, Error, Result};
@@ -71,19 +72,25 @@ pub fn settings(args: &Args, plan: &Plan, scene: &Scene) -> Result<Settings> {
 ///
 /// # Errors
 /// Those of [`check_room`] and [`plan::plan`].
-pub fn make(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<Option<Plan>> {
+pub fn make(
+    args: &Args,
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &Settings,
+    warnings: &mut Warnings,
+) -> Result<Option<Plan>> {
     let Some(target) = target(args) else { return Ok(None) };
     check_room(args.filter(settings), settings, gpu)?;
-    let methods = args.denoise.map_or_else(|| fitting(args, gpu, settings), |method| vec![method]);
+    let methods = args.denoise.map_or_else(|| fitting(gpu, settings, warnings), |method| vec![method]);
     plan::plan(gpu, scene, settings, args.wanted(), &methods, target).map(Some)
 }
 
 /// What a plan may choose among that names no filter, less what this film has no room for, which is said.
-fn fitting(args: &Args, gpu: &Gpu, settings: &Settings) -> Vec<Method> {
+fn fitting(gpu: &Gpu, settings: &Settings, warnings: &mut Warnings) -> Vec<Method> {
     let mut methods = plan::usual_methods();
     methods.retain(|method| match check_room(Some(*method), settings, gpu) {
         Err(why) if !method.is_none() => {
-            args.common.warn(&[format!("the plan leaves out {}: {why}", method.name())]);
+            warnings.add([format!("the plan leaves out {}: {why}", method.name())]);
             false
         }
         _ => true,
@@ -156,9 +163,15 @@ mod tests {
         let gpu = Gpu::open(&DeviceOptions { tuning, ..DeviceOptions::default() }).unwrap();
         let of_width = |width| Settings { width, height: 1, ..Settings::default() };
         let args = |words: &[&str]| Command::parse_from([&["render", "scene.toml", "--quiet"], words].concat()).args;
-        let methods = |width| fitting(&args(&["--time", "1s"]), &gpu, &of_width(width));
-        let named = |width| methods(width).into_iter().map(Method::name).collect::<Vec<_>>();
-        assert_eq!((named(64), named(65)), (vec!["none", "auto"], vec!["none"]));
+        let of_film = |width| {
+            let mut warnings = args(&["--time", "1s"]).common.warnings();
+            let methods = fitting(&gpu, &of_width(width), &mut warnings);
+            (methods.into_iter().map(Method::name).collect::<Vec<_>>(), warnings.into_all())
+        };
+        assert_eq!(of_film(64), (vec!["none", "auto"], vec![]));
+        let (named, warnings) = of_film(65);
+        assert_eq!((named, warnings.len()), (vec!["none"], 1));
+        assert!(warnings[0].starts_with("the plan leaves out auto: "), "{warnings:?}");
         let fits = |name: &str, settings: Settings| {
             check_room(args(&["--denoise", name]).filter(&settings), &settings, &gpu).is_ok()
         };

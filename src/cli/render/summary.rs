@@ -50,7 +50,7 @@ pub struct Summary {
     pub passes: Vec<PassRow>,
     /// What the filter says of its work: pixels that were cut, the error that it expects. Whether the time was far from the planned one.
     pub notes: Vec<String>,
-    /// What was repaired in the scene.
+    /// What is odd in the scene and the options.
     pub warnings: Vec<String>,
 }
 

@@ -3,6 +3,7 @@ use super::shot::Shot;
 use super::summary::{Summary, text};
 use super::{Args, Spans, outputs, planned};
 use crate::cli::checkpoint::CheckpointFile;
+use crate::cli::common::Warnings;
 use crate::cli::files::Files;
 use crate::cli::{complain, fail_on_messages, interrupt};
 use crate::denoise::filter::Method;
@@ -14,7 +15,6 @@ use crate::image::aov::{Aovs, Names};
 use crate::plan::Plan;
 use crate::render::{Counters, Job, Status, StopReason, film};
 use crate::report::table;
-use crate::scene::Scene;
 use crate::statistics::BrokenSamples;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -22,7 +22,6 @@ use std::time::Duration;
 /// A render that is over, and nowhere written yet.
 pub struct Taken<'a> {
     gpu: &'a Gpu,
-    scene: &'a Scene,
     film: Film,
     /// What the host did.
     host: Spans,
@@ -31,6 +30,8 @@ pub struct Taken<'a> {
     counters: Option<Counters>,
     /// What the filter says of its work.
     notes: Vec<String>,
+    /// What the command has warned of.
+    warnings: Vec<String>,
     noisy: Option<Noisy>,
     files: Files,
     checkpoint: Option<CheckpointFile>,
@@ -46,14 +47,7 @@ const STEP_TIME: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// [`crate::error::Error::Device`].
-pub fn shoot<'a>(
-    args: &Args,
-    gpu: &'a Gpu,
-    scene: &'a Scene,
-    job: Job,
-    mut files: Files,
-    mut host: Spans,
-) -> Result<Option<Taken<'a>>> {
+pub fn shoot<'a>(args: &Args, gpu: &'a Gpu, job: Job, mut files: Files, mut host: Spans) -> Result<Option<Taken<'a>>> {
     let settings = job.renderer.settings();
     let noisy = args.filter(settings).map(|_| Noisy::of_film(job.renderer)).transpose()?;
     let pixel = args.pixel.map(|[x, y]| y * settings.width + x);
@@ -66,8 +60,8 @@ pub fn shoot<'a>(
     let seconds = host.seconds("render");
     let film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| job.renderer.counters()).transpose()?;
-    let (notes, instead) = (Vec::new(), String::new());
-    Ok(Some(Taken { gpu, scene, film, host, status, counters, notes, noisy, files, checkpoint, instead }))
+    let (notes, warnings, instead) = (Vec::new(), Vec::new(), String::new());
+    Ok(Some(Taken { gpu, film, host, status, counters, notes, warnings, noisy, files, checkpoint, instead }))
 }
 
 impl Taken<'_> {
@@ -79,6 +73,11 @@ impl Taken<'_> {
     /// Says what `--resume` needs in place of the plan that was followed.
     pub fn resumes_by(&mut self, instead: String) {
         self.instead = instead;
+    }
+
+    /// Remembers what the command has warned of.
+    pub fn has_warned_of(&mut self, warnings: Warnings) {
+        self.warnings = warnings.into_all();
     }
 
     /// Where the images were written of which the samples are not all taken, and how to go on if the device can.
@@ -166,7 +165,7 @@ impl Taken<'_> {
 
     /// In numbers, with the plan that it followed and the files that were written.
     fn summary(&self, plan: Option<&Plan>, written: &[PathBuf]) -> Summary {
-        let Self { gpu, scene, film, host, status, counters, notes, .. } = self;
+        let Self { gpu, film, host, status, counters, notes, .. } = self;
         let counts = film.words("samples").unwrap_or_default();
         let gpu_ms = total_ms(&status.times);
         let missed = plan.filter(|_| self.is_whole()).and_then(|plan| plan.missed(gpu_ms));
@@ -191,7 +190,7 @@ impl Taken<'_> {
             gpu_ms,
             passes: table::summarise(&status.times),
             notes: notes.iter().cloned().chain(missed).collect(),
-            warnings: scene.warnings.clone(),
+            warnings: self.warnings.clone(),
         }
     }
 }

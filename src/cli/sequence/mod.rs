@@ -240,7 +240,7 @@ struct Summary {
     interrupted: bool,
     seconds: f64,
     device: String,
-    /// What was repaired in the scene, and what else is odd.
+    /// What is odd in the scene, the frames and the options.
     warnings: Vec<String>,
 }
 

@@ -68,24 +68,24 @@ impl<'a> Stage<'a> {
             let span = f64::from(frames.start) / args.fps..f64::from(frames.end) / args.fps;
             animation.movers.push(Arc::new(Turntable::new(&scene, settings.size(), degrees, span)));
         }
-        let mut warnings = scene.warnings.clone();
+        let mut warnings = args.render.common.warnings();
+        warnings.add(scene.warnings.clone());
         if animation.is_empty() {
             let what = "nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)";
-            warnings.push(what.to_owned());
+            warnings.add([what.to_owned()]);
         }
-        args.render.common.warn(&warnings);
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(args.render.filter(&settings), &settings, &gpu)?;
-        render::check_stride(&args.render, &settings)?;
+        render::check_stride(&args.render, &settings, &mut warnings)?;
         render::tell_of_lens(&args.render, &scene);
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         let rest = survey.effects(&settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
         let own_seeds = args.seed_per_frame || reproject.is_some() || slides(args, &survey);
         let moves = Moves::of(&animation);
-        render::warn_of_unread(&args.render, &settings);
+        render::warn_of_unread(&args.render, &settings, &mut warnings);
         if reproject.is_none() {
-            render::warn_of_unplaced(&args.render, &settings);
+            render::warn_of_unplaced(&settings, &mut warnings);
         }
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
         Ok(Self {
@@ -95,7 +95,7 @@ impl<'a> Stage<'a> {
             animation,
             frames,
             settings,
-            warnings,
+            warnings: warnings.into_all(),
             framed,
             rest,
             renderer,
@@ -113,7 +113,7 @@ impl<'a> Stage<'a> {
         &self.frames
     }
 
-    /// What was repaired in the scene, and what else is odd.
+    /// What is odd in the scene, the frames and the options.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -196,7 +196,7 @@ impl<'a> Stage<'a> {
     fn shoot(&self, args: &render::Args, settings: &Settings, carries: bool) -> Result<Option<render::Taken<'_>>> {
         let renderer = self.renderer()?;
         let job = Job { carries, ..Job::new(renderer) };
-        let mut shot = render::shoot(args, &self.gpu, &self.scene, job, Files::of_frame(), Spans::default())?;
+        let mut shot = render::shoot(args, &self.gpu, job, Files::of_frame(), Spans::default())?;
         if let Some(shot) = shot.as_mut().filter(|_| self.reproject.is_some()) {
             renderer.add_history(shot.film_mut(), &self.scene)?;
             self.chain.tell(shot.film_mut(), &self.scene, settings, self.reproject)?;
