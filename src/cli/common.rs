@@ -51,7 +51,7 @@ impl Common {
 
     /// Takes warnings, and prints each unless only the result is wanted.
     pub fn warnings(&self) -> Warnings {
-        Warnings { is_printed: self.talkative(), all: Vec::new() }
+        Warnings::new(self.talkative())
     }
 
     /// Prints what a command found: `found` as JSON or `text`, or nothing.
@@ -88,6 +88,11 @@ pub struct Warnings {
 }
 
 impl Warnings {
+    /// None so far; whether each is printed, too.
+    pub fn new(is_printed: bool) -> Self {
+        Self { is_printed, all: Vec::new() }
+    }
+
     /// Warns of what is odd.
     pub fn add(&mut self, warnings: impl IntoIterator<Item = String>) {
         for warning in warnings {

@@ -2,9 +2,10 @@
 mod text;
 
 use super::choices::Choices;
+use super::common::Warnings;
 use super::overrides::Overrides;
 use super::progress::Stages;
-use super::{Exit, complain, print, print_json};
+use super::{Exit, print, print_json};
 use crate::cost::document::Estimate;
 use crate::cost::interval;
 use crate::error::{Error, Result};
@@ -103,14 +104,12 @@ pub fn run(args: &Args) -> Result<Exit> {
     let (file, settings) = args.choices.open_at_rest(&args.scene, &args.overrides)?;
     settings.validate()?;
     let scene = file.load()?.with(|own| *own = settings);
-    let warnings = scene.warnings.clone();
-    if !args.json {
-        warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
-    }
+    let mut warnings = Warnings::new(!args.json);
+    warnings.add(scene.warnings.clone());
     let mut effects = listed(&args.effects, &scene)?;
     let sizes = (!args.no_measure).then(|| measure(&mut effects, args, scene)).transpose()?;
     if args.json {
-        print_json(&Report { effects, sizes, warnings })?;
+        print_json(&Report { effects, sizes, warnings: warnings.into_all() })?;
     } else {
         print(&text(&effects, sizes))?;
     }
