@@ -197,6 +197,7 @@ fn hint(unknown: &str, known: &[&str]) -> Option<String> {
         "glass" => "dielectric",
         "plastic" => "coated",
         "pbr" | "principled" | "disney" => "metallic-roughness",
+        "position" | "translate" | "rotate" | "scale" | "matrix" => "transform",
         _ => unknown,
     };
     let word = if of(elsewhere) { elsewhere } else { unknown };
@@ -252,6 +253,7 @@ mod tests {
             }
         }
         assert!(!error("[[material]]\nglass = 1").contains("dielectric"));
+        assert!(error("[[mesh]]\nposition = 1").contains("unknown key \"position\": did you mean \"transform\"?"));
         assert!(error("[[light]]\ncolor = 1").contains("unknown key \"color\": a light has an intensity, or"));
         assert!(error("[[sun]]\n").starts_with("s.toml, line 1: unknown key \"sun\". Known: film, camera"));
     }
