@@ -40,7 +40,8 @@ const float LEAST_NOISE = 0.05;
 // From this number of samples on svgf takes part. With it, two samples left Crytek Sponza dark and grained: FLIP .203 in place of .163.
 const float ENOUGH_FOR_SVGF = 4.0;
 // What one sample has brought is cut to so many times what svgf finds. Such pixels are few among those whose noise their neighbours
-// tell to be small, so that the image itself seems best for them: two of them were nine tenths of relMSE on Veach's plates.
+// tell to be small, so that the image itself seems best for them: two of them were nine tenths of relMSE on Veach's plates. A pixel that
+// is darker than the blend has brought it no light, however much of its own is of one sample: cut as well, such pixels were black specks.
 const float OF_ONE_SAMPLE = 3.0;
 // From this number of samples on: of fewer, one often brings most.
 const float ENOUGH_TO_TELL_ONE = 8.0;
@@ -86,12 +87,13 @@ void main() {
     // Mean products of the candidates' errors. An independent copy of the pixel misses it by the noise of both, and shares
     // the pixel's own noise with every filter's error.
     float told = 0.5 * other.z, noise = max(min(told, min(min(square.x, square.y), min(square.z, square.w))), LEAST_NOISE * told);
+    float optimism = optimism_of(noise);
     float missed[5][5] = float[][](
         float[](2.0 * noise, noise, noise, noise, noise),
-        float[](noise, square.x, product.x, product.y, product.z),
-        float[](noise, product.x, square.y, product.w, other.x),
-        float[](noise, product.y, product.w, square.z, other.y),
-        float[](noise, product.z, other.x, other.y, square.w));
+        float[](noise, square.x, product.x, product.y, product.z + optimism),
+        float[](noise, product.x, square.y, product.w, other.x + optimism),
+        float[](noise, product.y, product.w, square.z, other.y + optimism),
+        float[](noise, product.z + optimism, other.x + optimism, other.y + optimism, square.w + 2.0 * optimism));
     float w[5] = float[](0.0, 0.0, 0.0, 0.0, 0.0), least = MAX_ERROR;
     int best = 1;
     [[unroll]] for (int k = 0; k < 5; k++) {
@@ -125,7 +127,7 @@ void main() {
     vec3 all = base + off;
     float of_mean = own_variance(at, c.w), bright = luminance(all), most = OF_ONE_SAMPLE * max(luminance(d.rgb), 0.0);
     bool dominated = usable[4] && c.w >= ENOUGH_TO_TELL_ONE && of_mean >= 0.0 && sqrt(of_mean) > DOMINATED * abs(luminance(c.rgb));
-    if (dominated && bright > most) all *= most / bright;
+    if (dominated && bright > most && luminance(c.rgb) > bright) all *= most / bright;
     bool doubted = of_mean >= 0.0 && c.w >= ENOUGH_TO_DOUBT && !blurred(at);
     blend[i] = any_usable ? vec4(all, doubted ? max(of_mean, texelFetch(estimate, at).w) : of_mean) : vec4(vec3(0.0), UNFILTERED);
 }

@@ -27,10 +27,6 @@ const float MOST = 0.9; // largest leverage: beyond it, too little is left to ju
 // own leverage would make filters seem good that keep much of the pixel.
 const float OWN = 0.3;
 const float LIMIT = 1e9; // luminance and its differences are cut here, so that their products are finite
-// An error counts the less, the noisier the surroundings are: in squared luminance plus so many times the variance. Without it
-// the noise of bright reflections decided which candidate is taken around them (Veach's plates at 4 samples: relMSE 0.31
-// instead of 0.02). Not the pixel's own variance, which few samples tell too small where they are dark by chance.
-const float NOISE = 4.0;
 // Errors are relative to the mean of the candidates; with more samples than this, to svgf's more and more. The windows take light into
 // dark pixels (between reflections on Veach's plates), where errors would count too little.
 const float FEW = 4.0;

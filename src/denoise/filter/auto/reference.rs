@@ -10,8 +10,8 @@ use crate::layout::{vec3, vec4};
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
 use crate::shaders::auto::{ENOUGH_FOR_SVGF, ENOUGH_TO_TELL_ONE, LEAST_NOISE, OF_ONE_SAMPLE, RIDGE, ROUNDS};
-use crate::shaders::auto_error::{FEW, LIMIT, MOST, NOISE, OWN, REACH};
-use crate::shaders::shared::candidates::{BRIGHT, LEAST_SHARE, TRUST};
+use crate::shaders::auto_error::{FEW, LIMIT, MOST, OWN, REACH};
+use crate::shaders::shared::candidates::{BRIGHT, LEAST_SHARE, NOISE, OPTIMISM, TRUST};
 use crate::shaders::shared::dominated::DOMINATED;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use std::array::from_fn;
@@ -230,12 +230,14 @@ fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
 fn matrix([squares, products, others]: [Vec4; 3]) -> Errors {
     let told = 0.5 * others.z;
     let noise = told.min(squares.min_element()).max(LEAST_NOISE * told);
+    let optimism = OPTIMISM * (NOISE * noise).min(1.0).powi(2) * noise;
+    let (products, others) = (products + optimism * Vec4::Z, others + optimism * (Vec4::X + Vec4::Y));
     [
         [2.0 * noise, noise, noise, noise, noise],
         [noise, squares.x, products.x, products.y, products.z],
         [noise, products.x, squares.y, products.w, others.x],
         [noise, products.y, products.w, squares.z, others.y],
-        [noise, products.z, others.x, others.y, squares.w],
+        [noise, products.z, others.x, others.y, squares.w + 2.0 * optimism],
     ]
 }
 
@@ -263,8 +265,9 @@ fn blend(p: &Packed, (usable, w): ([bool; BLENDED], [f32; BLENDED]), filtered: [
 /// Cuts what one sample has brought and svgf does not find around it.
 fn less_of_one_sample(p: &Packed, variance: f32, blend: Vec4, svgf: Vec3) -> Vec4 {
     let (bright, most) = (luminance(blend.xyz()), OF_ONE_SAMPLE * luminance(svgf).max(0.0));
-    let dominated = variance.sqrt() > DOMINATED * luminance(p.colour).abs();
-    if dominated && bright > most { (blend.xyz() * (most / bright)).extend(blend.w) } else { blend }
+    let own = luminance(p.colour);
+    let dominated = variance.sqrt() > DOMINATED * own.abs();
+    if dominated && bright > most && own > bright { (blend.xyz() * (most / bright)).extend(blend.w) } else { blend }
 }
 
 /// Weights of at least 0, together 1, whose blend has the least mean square; those that are not usable get none.
