@@ -1,5 +1,6 @@
 //! `--checkpoint`: writes an unfinished render to a file at regular intervals, so that a crash loses only the work since
 //! the last one.
+use super::common::Warnings;
 use super::complain;
 use super::files::{Files, Item, first_with_layers, partial_name, scene_name};
 use crate::error::Checked;
@@ -50,8 +51,8 @@ impl CheckpointFile {
         self.last.elapsed() >= self.every
     }
 
-    /// Writes `film` and returns the path of the latest checkpoint. A failure is reported once, and the render continues.
-    pub fn write(&mut self, files: &mut Files, film: &Film) -> Option<PathBuf> {
+    /// Writes `film` and returns the path of the latest checkpoint. A failure is warned of once, and the render continues.
+    pub fn write(&mut self, files: &mut Files, film: &Film, warnings: &mut Warnings) -> Option<PathBuf> {
         let item = Item::image(self.path.clone(), film, WriteOptions::default());
         match files.add(&self.path, &item) {
             Ok(place) => {
@@ -62,7 +63,7 @@ impl CheckpointFile {
                 self.written = Some(place);
             }
             Err(e) if !self.complained => {
-                complain(&format!("warning: {e}; the render goes on without this checkpoint"));
+                warnings.insist([format!("{e}; the render goes on without this checkpoint")]);
                 self.complained = true;
             }
             Err(_) => {}
@@ -89,6 +90,18 @@ mod tests {
         assert_eq!(path(&outputs(&["a.png", "x/b.exr", "c.exr"]), Path::new("s.toml")), Path::new("x/b.partial.exr"));
         assert_eq!(path(&outputs(&["x/a.png", "b.hdr"]), Path::new("s.toml")), Path::new("x/a.partial.exr"));
         assert_eq!(path(&outputs(&["/dev/null"]), Path::new("scenes/s.toml")), Path::new("s.partial.exr"));
+    }
+
+    #[test]
+    fn one_that_cannot_be_written_is_warned_of_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("gone").join("a.partial.exr");
+        let mut checkpoint = CheckpointFile::new(Duration::ZERO, path, None);
+        let (mut files, mut warnings) = (Files::new(None), Warnings::new(false));
+        let written = [(); 2].map(|()| checkpoint.write(&mut files, &Film::new(1, 1), &mut warnings));
+        assert_eq!(written, [None, None]);
+        let [line] = warnings.all() else { panic!("{:?}", warnings.all()) };
+        assert!(line.contains("a.partial.exr") && line.ends_with("goes on without this checkpoint"), "{line}");
     }
 
     #[test]

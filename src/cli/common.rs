@@ -84,23 +84,37 @@ impl Common {
 /// What a command has warned of so far: lines on stderr, and a list in its JSON.
 pub struct Warnings {
     is_printed: bool,
+    place: String,
     all: Vec<String>,
 }
 
 impl Warnings {
     /// None so far; whether each is printed, too.
     pub fn new(is_printed: bool) -> Self {
-        Self { is_printed, all: Vec::new() }
+        Self { is_printed, place: String::new(), all: Vec::new() }
+    }
+
+    /// From here on all of them are of this place, which stands before each: a frame of a sequence.
+    pub fn are_of(&mut self, place: String) {
+        self.place = place + ": ";
     }
 
     /// Warns of what is odd.
     pub fn add(&mut self, warnings: impl IntoIterator<Item = String>) {
-        for warning in warnings {
-            if self.is_printed {
-                complain(&format!("warning: {warning}"));
-            }
-            self.all.push(warning);
+        warnings.into_iter().for_each(|warning| self.take(&warning, self.is_printed));
+    }
+
+    /// Warns of what is wrong with the result, or would lose it: that is printed with `--quiet` and `--json`, too.
+    pub fn insist(&mut self, warnings: impl IntoIterator<Item = String>) {
+        warnings.into_iter().for_each(|warning| self.take(&warning, true));
+    }
+
+    fn take(&mut self, warning: &str, is_printed: bool) {
+        let warning = format!("{}{warning}", self.place);
+        if is_printed {
+            complain(&format!("warning: {warning}"));
         }
+        self.all.push(warning);
     }
 
     /// Warns of options that were given and change nothing, because `name`, the policy or filter that was chosen, does not read them.
@@ -110,8 +124,8 @@ impl Warnings {
     }
 
     /// All of them, in the order in which they came.
-    pub fn into_all(self) -> Vec<String> {
-        self.all
+    pub fn all(&self) -> &[String] {
+        &self.all
     }
 }
 

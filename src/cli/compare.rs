@@ -7,6 +7,7 @@ mod report;
 mod statistical;
 mod words;
 
+use super::common::Warnings;
 use super::files::check_distinct;
 use super::{Exit, check_png, complain, finite, print, print_json, readable, within};
 use crate::error::{Error, Result};
@@ -95,14 +96,15 @@ pub fn run(args: &Args) -> Result<Exit> {
     check_sizes((&args.a, a.size()), (&args.b, b.size()))?;
     image::check_memory(&args.a, a.pixels.len() as u64 * BYTES_PER_PIXEL)?;
     let unseen = metrics::unseen(&a, &b);
+    let mut warnings = Warnings::new(true);
     if unseen > UNSEEN {
         args.limits.check_seen(unseen)?;
-        complain(&format!("warning: {}", words_of_unseen(unseen)));
+        warnings.add([words_of_unseen(unseen)]);
     }
     let metrics = metrics::compare(&a, &b);
     let exceeded = args.limits.exceeded(&metrics)?;
     let scale = args.diff.as_ref().map(|path| write_diff(path, &a, &b)).transpose()?;
-    report(args, &metrics, scale, &exceeded)?;
+    report(args, &metrics, scale, &exceeded, warnings.all())?;
     for line in &exceeded {
         complain(line);
     }
@@ -191,13 +193,13 @@ fn write_diff(path: &Path, a: &Picture, b: &Picture) -> Result<f32> {
     Ok(top)
 }
 
-fn report(args: &Args, m: &Metrics, scale: Option<f32>, exceeded: &[String]) -> Result<()> {
+fn report(args: &Args, m: &Metrics, scale: Option<f32>, exceeded: &[String], warnings: &[String]) -> Result<()> {
     if args.json {
         let text = |path: &Path| path.display().to_string();
         let diff = args.diff.as_ref().zip(scale).map(|(path, top)| json!({ "file": text(path), "scale": [0.0, top] }));
         let (a, b, layer) = (text(&args.a), text(&args.b), &args.layer);
         return print_json(
-            &json!({ "a": a, "b": b, "layer": layer, "metrics": m, "diff": diff, "exceeded": exceeded }),
+            &json!({ "a": a, "b": b, "layer": layer, "metrics": m, "diff": diff, "exceeded": exceeded, "warnings": warnings }),
         );
     }
     let rows: Vec<_> = NAMES.iter().zip(values(m)).map(|(name, value)| vec![(*name).to_owned(), value]).collect();

@@ -34,10 +34,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     let (scene, points) = Points::new(args, path, &gpu)?;
     let mut warnings = args.common.warnings();
     warnings.add([&scene.warnings[..], &points.notes].concat());
-    let warnings = warnings.into_all();
     let plan = plan(args, path, &scene, points, &gpu)?;
     let key = key(&gpu, &scene, &plan);
-    measured(args, &gpu, &key, &warnings, |earlier, watch| measure(&gpu, &scene, &plan, earlier, watch))
+    measured(args, &gpu, &key, warnings.all(), |earlier, watch| measure(&gpu, &scene, &plan, earlier, watch))
 }
 
 fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> Result<Plan> {

@@ -50,13 +50,13 @@ pub struct Args {
 
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Report {
+struct Report<'a> {
     effects: Vec<EffectRow>,
     /// `None` where nothing was measured.
     #[serde(flatten)]
     sizes: Option<Sizes>,
     /// What was repaired in the scene.
-    warnings: Vec<String>,
+    warnings: &'a [String],
 }
 
 /// Width and height of the films that costs are of.
@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut effects = listed(&args.effects, &scene)?;
     let sizes = (!args.no_measure).then(|| measure(&mut effects, args, scene)).transpose()?;
     if args.json {
-        print_json(&Report { effects, sizes, warnings: warnings.into_all() })?;
+        print_json(&Report { effects, sizes, warnings: warnings.all() })?;
     } else {
         print(&text(&effects, sizes))?;
     }

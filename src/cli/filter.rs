@@ -142,7 +142,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         passes: table::summarise(&times),
         before: distance(&noisy),
         after: distance(&clean.shown),
-        warnings: warnings.into_all(),
+        warnings: warnings.all().to_vec(),
     };
     args.common.report(&summary, || text(args, &summary))?;
     files.check()?;

@@ -1,4 +1,5 @@
 //! `tallow merge`: combines renders of the same picture with different samples into one.
+use super::common::Warnings;
 use super::{Exit, complain, quoted};
 use crate::error::{Error, Result};
 use crate::image::{self, WriteOptions};
@@ -33,9 +34,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let Merged { film, gaps, filtered } = render::merge(&args.files)?;
     image::write(&args.output, &film, &WriteOptions::default())?;
-    for Gap { seed, first, last } in gaps {
-        complain(&format!("warning: samples {first} to {last} of seed {seed} are missing"));
-    }
+    let missing = |Gap { seed, first, last }| format!("samples {first} to {last} of seed {seed} are missing");
+    Warnings::new(true).add(gaps.into_iter().map(missing));
     if let Some((part, filter)) = filtered.first() {
         let (part, output) = (part.display(), quoted(&args.output.display().to_string()));
         complain(&format!(

@@ -22,7 +22,7 @@ use crate::memory;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Checkpoint, Job, Outputs, Renderer, all_effects, film};
 use crate::scene::{Loaded, Scene, light_and_camera_effects};
-pub use shot::FRAME;
+pub use shot::{FRAME, Shot};
 pub use spans::Spans;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -168,13 +168,12 @@ pub fn run(args: &Args) -> Result<Exit> {
     tell_of_lens(args, &scene);
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, settings))?;
     if args.checkpoint.is_some() && !renderer.can_resume() {
-        complain(
-            "warning: a film of this size cannot go on from a checkpoint on this device, which keeps the picture alone",
-        );
+        let what = "a film of this size cannot go on from a checkpoint on this device, which keeps the picture alone";
+        warnings.insist([what.to_owned()]);
     }
     let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
     let files = Files::new(args.resume.as_deref());
-    let taken = shoot(args, &gpu, job, files, host)?;
+    let taken = shoot(Shot { args, gpu: &gpu, job }, files, host, &mut warnings)?;
     let can_resume = renderer.can_resume();
     // The film is all that is left to write and to filter, and large films need the memory.
     drop(renderer);
@@ -182,9 +181,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         complain("interrupted before the first sample: nothing was written");
         return Ok(Exit::Interrupted);
     };
-    taken.has_warned_of(warnings);
     taken.resumes_by(plan.as_ref().map_or_else(String::new, |plan| planned::instead(plan, &asked)));
-    let written = taken.finish(args, plan.as_ref(), true)?;
+    let written = taken.finish(args, plan.as_ref(), true, &mut warnings)?;
     if !taken.is_whole() {
         complain(&taken.interruption(&written, can_resume));
         return Ok(Exit::Interrupted);

@@ -155,6 +155,18 @@ fn samples_that_are_no_numbers_are_told_and_add_up() {
     let output = run(&folder, "render s.toml --filter point --json -o c.exr");
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(json["broken_samples"]["count"], 4);
+    let warned = |output: &std::process::Output| {
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let lines =
+            json["warnings"].as_array().unwrap().iter().map(|line| format!("warning: {}\n", line.as_str().unwrap()));
+        (lines.collect::<String>(), String::from_utf8(output.stderr.clone()).unwrap())
+    };
+    assert_eq!(warned(&output), (said.clone(), said.clone()), "the list has what is told whatever is printed");
+    let frames = run(&folder, "sequence s.toml --filter point --json --frames 0..2 --reproject off -o f.#.exr");
+    let (listed, printed) = warned(&frames);
+    let of_frames = [0, 1].map(|frame| said.replace("warning: ", &format!("warning: frame {frame}: "))).concat();
+    assert_eq!(printed, of_frames, "each says of which frame it is");
+    assert!(listed.starts_with("warning: nothing moves") && listed.ends_with(&of_frames), "{listed}");
     let beside = run(&folder, "render s.toml --filter box --quiet -o d.exr");
     assert!(beside.stderr.is_empty() && told("d.exr").is_none(), "control: beside it there is light: {beside:?}");
 }

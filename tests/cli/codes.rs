@@ -195,6 +195,8 @@ fn metrics_of_what_is_shown_judge_nothing_that_is_not() {
         tallow(&folder, &[&["compare"], &files[..], &words.split_whitespace().collect::<Vec<_>>()].concat())
     };
     complains(&compare(["a.exr", "b.exr"], "--layer Z"), 0, &["58 % of the pixels differ beyond 0 and 1"]);
+    let listed = stdout(&compare(["a.exr", "b.exr"], "--layer Z --json"));
+    assert!(listed.contains(r#""warnings":["58 % of the pixels differ beyond 0 and 1"#), "{listed}");
     complains(&compare(["a.exr", "b.exr"], "--layer Z --max-flip 1"), 2, &["--max-flip", "by --max-mse"]);
     complains(&compare(["a.exr", "b.exr"], "--layer Z --min-psnr 1"), 2, &["--min-psnr", "58 %"]);
     let told = compare(["a.exr", "b.exr"], "--layer Z --max-mse 0.1");

@@ -1,8 +1,9 @@
 //! The files that a render writes.
 use super::{Args, planned};
 use crate::cli::checkpoint::{self, CheckpointFile};
+use crate::cli::common::Warnings;
 use crate::cli::files::{Files, Item, check_distinct, check_not_of_scene};
-use crate::cli::{check_png, complain, quoted};
+use crate::cli::{check_png, quoted};
 use crate::error::Result;
 use crate::image::difference::false_colours;
 use crate::image::output::{self, Stream};
@@ -68,15 +69,12 @@ pub fn save(
     files: &mut Files,
     checkpoint: Option<CheckpointFile>,
     whole: bool,
+    warnings: &mut Warnings,
 ) -> Vec<PathBuf> {
-    let broken = film.picture(None).map_or(0, |p| p.non_finite());
-    if broken > 0 {
-        complain(&format!("warning: {broken} pixels are not finite"));
-    }
     let mut written = files.save(items, whole);
     let Some(mut checkpoint) = checkpoint else { return written };
     if !whole && !written.iter().any(|path| image::has_layers(path)) {
-        written.extend(checkpoint.write(files, film));
+        written.extend(checkpoint.write(files, film, warnings));
     }
     if files.check().is_ok() {
         checkpoint.remove(&written);
@@ -91,12 +89,13 @@ pub fn save_noisy(
     film: &Film,
     files: &mut Files,
     checkpoint: &mut Option<CheckpointFile>,
+    warnings: &mut Warnings,
 ) -> Vec<PathBuf> {
     if item.iter().any(|item| image::has_layers(&item.path)) {
-        return save(item, film, files, checkpoint.take(), true);
+        return save(item, film, files, checkpoint.take(), true, warnings);
     }
-    let mut written = save(item, film, files, None, true);
-    written.extend(checkpoint.as_mut().and_then(|checkpoint| checkpoint.write(files, film)));
+    let mut written = save(item, film, files, None, true, warnings);
+    written.extend(checkpoint.as_mut().and_then(|checkpoint| checkpoint.write(files, film, warnings)));
     written
 }
 

@@ -166,7 +166,7 @@ mod tests {
         let of_film = |width| {
             let mut warnings = args(&["--time", "1s"]).common.warnings();
             let methods = fitting(&gpu, &of_width(width), &mut warnings);
-            (methods.into_iter().map(Method::name).collect::<Vec<_>>(), warnings.into_all())
+            (methods.into_iter().map(Method::name).collect::<Vec<_>>(), warnings.all().to_vec())
         };
         assert_eq!(of_film(64), (vec!["none", "auto"], vec![]));
         let (named, warnings) = of_film(65);

@@ -1,6 +1,7 @@
 //! A render that goes on, and its films then and at its end.
 use super::Args;
 use crate::cli::checkpoint::{self, CheckpointFile};
+use crate::cli::common::Warnings;
 use crate::cli::files::Files;
 use crate::cli::interrupt;
 use crate::cli::progress::Progress;
@@ -15,16 +16,16 @@ use std::time::{Instant, SystemTime};
 
 /// What a film is made of while its render goes on, and at its end.
 #[derive(Clone, Copy)]
-pub struct Shot<'a> {
+pub struct Shot<'a, 'gpu> {
     /// What the user wants.
     pub args: &'a Args,
     /// What renders it.
-    pub gpu: &'a Gpu,
+    pub gpu: &'gpu Gpu,
     /// The render.
     pub job: Job<'a>,
 }
 
-impl Shot<'_> {
+impl Shot<'_, '_> {
     /// Reads back what there is, after so many seconds of rendering.
     ///
     /// # Errors
@@ -39,7 +40,7 @@ impl Shot<'_> {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn trace(&self, files: &mut Files) -> Result<(Status, Option<CheckpointFile>)> {
+    pub fn trace(&self, files: &mut Files, warnings: &mut Warnings) -> Result<(Status, Option<CheckpointFile>)> {
         let Shot { args, gpu, job } = *self;
         let mut checkpoint = args.checkpoint.map(|every| {
             let path = checkpoint::path(&args.output_files(), &args.scene);
@@ -59,7 +60,7 @@ impl Shot<'_> {
                 return Ok(ControlFlow::Break(()));
             }
             if let Some(checkpoint) = checkpoint.as_mut().filter(|c| status.traced > 0 && c.is_due()) {
-                checkpoint.write(files, &self.film(status, begun.elapsed().as_secs_f64())?);
+                checkpoint.write(files, &self.film(status, begun.elapsed().as_secs_f64())?, warnings);
             }
             Ok(ControlFlow::Continue(()))
         };

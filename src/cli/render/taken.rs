@@ -5,7 +5,7 @@ use super::{Args, Spans, outputs, planned};
 use crate::cli::checkpoint::CheckpointFile;
 use crate::cli::common::Warnings;
 use crate::cli::files::Files;
-use crate::cli::{complain, fail_on_messages, interrupt};
+use crate::cli::{fail_on_messages, interrupt};
 use crate::denoise::filter::Method;
 use crate::denoise::{self, Filtered, Noisy, Recipe};
 use crate::error::Result;
@@ -30,8 +30,6 @@ pub struct Taken<'a> {
     counters: Option<Counters>,
     /// What the filter says of its work.
     notes: Vec<String>,
-    /// What the command has warned of.
-    warnings: Vec<String>,
     noisy: Option<Noisy>,
     files: Files,
     checkpoint: Option<CheckpointFile>,
@@ -42,26 +40,32 @@ pub struct Taken<'a> {
 /// A signal and a checkpoint wait for a step.
 const STEP_TIME: Duration = Duration::from_secs(1);
 
-/// Takes the samples of a job, or of the one pixel that is asked for; none when it was interrupted before the first. `files` are those
-/// that the run has written or may replace.
+/// Takes the samples of a shot, or of the one pixel that is asked for; none when it was interrupted before the first. `files` are those
+/// that the run has written or may replace, `host` what it has taken time for, and `warnings` what it has warned of.
 ///
 /// # Errors
 /// [`crate::error::Error::Device`].
-pub fn shoot<'a>(args: &Args, gpu: &'a Gpu, job: Job, mut files: Files, mut host: Spans) -> Result<Option<Taken<'a>>> {
+pub fn shoot<'gpu>(
+    shot: Shot<'_, 'gpu>,
+    mut files: Files,
+    mut host: Spans,
+    warnings: &mut Warnings,
+) -> Result<Option<Taken<'gpu>>> {
+    let Shot { args, gpu, job } = shot;
     let settings = job.renderer.settings();
     let noisy = args.filter(settings).map(|_| Noisy::of_film(job.renderer)).transpose()?;
     let pixel = args.pixel.map(|[x, y]| y * settings.width + x);
     let shot = Shot { args, gpu, job: Job { step_time: Some(STEP_TIME), pixel, ..job } };
-    let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
+    let (status, checkpoint) = host.time("render", || shot.trace(&mut files, warnings))?;
     if status.stopped == StopReason::Interrupted && status.traced == 0 {
         return Ok(None);
     }
-    status.broken_samples.iter().for_each(warn_of_broken);
+    warnings.insist(status.broken_samples.iter().map(words_of_broken));
     let seconds = host.seconds("render");
     let film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| job.renderer.counters()).transpose()?;
-    let (notes, warnings, instead) = (Vec::new(), Vec::new(), String::new());
-    Ok(Some(Taken { gpu, film, host, status, counters, notes, warnings, noisy, files, checkpoint, instead }))
+    let (notes, instead) = (Vec::new(), String::new());
+    Ok(Some(Taken { gpu, film, host, status, counters, notes, noisy, files, checkpoint, instead }))
 }
 
 impl Taken<'_> {
@@ -73,11 +77,6 @@ impl Taken<'_> {
     /// Says what `--resume` needs in place of the plan that was followed.
     pub fn resumes_by(&mut self, instead: String) {
         self.instead = instead;
-    }
-
-    /// Remembers what the command has warned of.
-    pub fn has_warned_of(&mut self, warnings: Warnings) {
-        self.warnings = warnings.into_all();
     }
 
     /// Where the images were written of which the samples are not all taken, and how to go on if the device can.
@@ -101,29 +100,35 @@ impl Taken<'_> {
     ///
     /// # Errors
     /// Of every kind; an output that fails keeps no other from being written.
-    pub fn finish(&mut self, args: &Args, plan: Option<&Plan>, alone: bool) -> Result<Vec<PathBuf>> {
+    pub fn finish(
+        &mut self,
+        args: &Args,
+        plan: Option<&Plan>,
+        alone: bool,
+        warnings: &mut Warnings,
+    ) -> Result<Vec<PathBuf>> {
         let noisy = self.noisy.take().filter(|_| self.is_whole());
         if let Some((method, noisy)) = args.denoise.zip(noisy) {
             if alone {
-                self.save_noisy(args)?;
+                self.save_noisy(args, warnings)?;
             }
             self.filter(method, noisy, plan.is_some())?;
         }
-        let written = self.write_all(args, plan)?;
+        let written = self.write_all(args, plan, warnings)?;
         if alone {
             self.files.end();
         }
-        let summary = self.summary(plan, &written);
+        let summary = Summary { warnings: warnings.all().to_vec(), ..self.summary(plan, &written) };
         args.common.report(&summary, || text(args, &summary))?;
         self.files.check()?;
         Ok(written)
     }
 
     /// From here on a signal ends the process, which says where the noisy image is.
-    fn save_noisy(&mut self, args: &Args) -> Result<()> {
+    fn save_noisy(&mut self, args: &Args, warnings: &mut Warnings) -> Result<()> {
         let Self { film, host, files, checkpoint, instead, .. } = self;
         let item = outputs::before_filter(args, film);
-        let save = || Ok(outputs::save_noisy(item.as_slice(), film, files, checkpoint));
+        let save = || Ok(outputs::save_noisy(item.as_slice(), film, files, checkpoint, warnings));
         let line = outputs::unfiltered(&host.time("write", save)?, instead);
         let line = files.with_failures(&line);
         if interrupt::leave_at_once(&line) {
@@ -148,11 +153,13 @@ impl Taken<'_> {
     }
 
     /// Files first, then pipes, which may have no reader; returns the images.
-    fn write_all(&mut self, args: &Args, plan: Option<&Plan>) -> Result<Vec<PathBuf>> {
+    fn write_all(&mut self, args: &Args, plan: Option<&Plan>, warnings: &mut Warnings) -> Result<Vec<PathBuf>> {
         let whole = self.is_whole();
         let Self { gpu, film, host, status, files, checkpoint, .. } = self;
+        let broken = film.picture(None).map_or(0, |picture| picture.non_finite());
+        warnings.insist((broken > 0).then(|| format!("{broken} pixels are not finite")));
         let images = outputs::items(args, film);
-        let save = || Ok(outputs::save(&images, film, files, checkpoint.take(), whole));
+        let save = || Ok(outputs::save(&images, film, files, checkpoint.take(), whole, warnings));
         let mut written = host.time("write", save)?;
         fail_on_messages(gpu)?;
         let mut more: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
@@ -190,16 +197,16 @@ impl Taken<'_> {
             gpu_ms,
             passes: table::summarise(&status.times),
             notes: notes.iter().cloned().chain(missed).collect(),
-            warnings: self.warnings.clone(),
+            warnings: Vec::new(),
         }
     }
 }
 
-/// Always told: it is a bug, light too strong for the numbers, or too much work for a path on llvmpipe.
-fn warn_of_broken(broken: &BrokenSamples) {
+/// It is a bug, light too strong for the numbers, or too much work for a path on llvmpipe.
+fn words_of_broken(broken: &BrokenSamples) -> String {
     let BrokenSamples { count, pixel: [x, y], sample, seed } = broken;
-    complain(&format!(
-        "warning: wrong samples: {count}, which were no number and count as black, or whose rays meet so much that the \
-         driver stopped them early; the first: pixel ({x}, {y}), sample {sample}, seed {seed}"
-    ));
+    format!(
+        "wrong samples: {count}, which were no number and count as black, or whose rays meet so much that the driver \
+         stopped them early; the first: pixel ({x}, {y}), sample {sample}, seed {seed}"
+    )
 }

@@ -5,7 +5,7 @@ mod range;
 mod stage;
 mod survey;
 
-use super::common::{frames_per_second, with_ranges};
+use super::common::{Warnings, frames_per_second, with_ranges};
 use super::files::{check_not_of_scene, key, scene_name};
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
@@ -233,7 +233,7 @@ pub struct FrameReport {
 
 /// What `--json` prints.
 #[derive(Clone, Debug, Serialize)]
-struct Summary {
+struct Summary<'a> {
     frames: Vec<FrameReport>,
     failed: usize,
     /// Whether a signal came before all frames were there.
@@ -241,7 +241,7 @@ struct Summary {
     seconds: f64,
     device: String,
     /// What is odd in the scene, the frames and the options.
-    warnings: Vec<String>,
+    warnings: &'a [String],
 }
 
 /// Runs the subcommand.
@@ -251,10 +251,11 @@ struct Summary {
 pub fn run(args: &Args) -> Result<Exit> {
     args.check()?;
     let begun = Instant::now();
-    let mut stage = Stage::new(args)?;
+    let mut warnings = args.render.common.warnings();
+    let mut stage = Stage::new(args, &mut warnings)?;
     let mut preview = args.preview.as_ref().map(|_| Preview::default());
     let (numbers, mut reports) = (args.numbers(stage.frames())?, Vec::new());
-    let ended = render_frames(args, &mut stage, numbers, preview.as_mut(), &mut reports);
+    let ended = render_frames(args, &mut stage, numbers, preview.as_mut(), &mut reports, &mut warnings);
     if let Ok(end) = &ended {
         interrupt::leave_at_once(end.line().unwrap_or("interrupted: all frames are finished"));
     }
@@ -267,7 +268,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let failed = reports.iter().filter(|report| report.error.is_some()).count();
     let (seconds, device) = (begun.elapsed().as_secs_f64(), stage.gpu().info().name.clone());
     if args.render.common.json {
-        let warnings = stage.warnings().to_vec();
+        let warnings = warnings.all();
         print_json(&Summary { frames: reports, failed, interrupted, seconds, device, warnings })?;
     }
     let end = ended?;
@@ -308,6 +309,7 @@ fn render_frames(
     numbers: Range<u32>,
     mut preview: Option<&mut Preview>,
     reports: &mut Vec<FrameReport>,
+    warnings: &mut Warnings,
 ) -> Result<End> {
     let mut unwritten = false;
     for number in numbers.clone() {
@@ -318,7 +320,7 @@ fn render_frames(
             false if interrupt::flag().load(Ordering::SeqCst) => return Ok(End::Interrupted(line)),
             _ => {}
         }
-        let (report, result) = stage.frame(number, preview.as_deref_mut());
+        let (report, result) = stage.frame(number, preview.as_deref_mut(), warnings);
         match result {
             Err(error @ Error::DeviceLost(_)) => {
                 reports.push(report);

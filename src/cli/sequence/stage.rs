@@ -4,6 +4,7 @@ use super::preview::Preview;
 use super::survey::Survey;
 use super::{Args, FrameReport, MOST_FRAMES};
 use crate::cli::Exit;
+use crate::cli::common::Warnings;
 use crate::cli::files::{Files, first_with_layers};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
 use crate::denoise::filter::Method;
@@ -31,8 +32,6 @@ pub struct Stage<'a> {
     /// Numbers of all frames.
     frames: Range<u32>,
     settings: Settings,
-    /// What was repaired in the scene, and what else is odd.
-    warnings: Vec<String>,
     /// What a camera without position has in view in every frame.
     framed: Option<[[f32; 3]; 2]>,
     /// Effects of all frames that were looked at: see [`Survey::effects`].
@@ -53,11 +52,11 @@ pub struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    /// Loads the scene and opens the device.
+    /// Loads the scene and opens the device, and warns of what is odd in the scene, the frames and the options.
     ///
     /// # Errors
     /// Of every kind.
-    pub fn new(args: &'a Args) -> Result<Self> {
+    pub fn new(args: &'a Args, warnings: &mut Warnings) -> Result<Self> {
         let (Loaded { mut scene, mut animation, .. }, settings) = render::load(&args.render)?;
         let frames = args.frames.clone().map_or_else(|| whole(&animation, args.fps), Ok)?;
         args.check_with(&frames, &scene)?;
@@ -68,7 +67,6 @@ impl<'a> Stage<'a> {
             let span = f64::from(frames.start) / args.fps..f64::from(frames.end) / args.fps;
             animation.movers.push(Arc::new(Turntable::new(&scene, settings.size(), degrees, span)));
         }
-        let mut warnings = args.render.common.warnings();
         warnings.add(scene.warnings.clone());
         if animation.is_empty() {
             let what = "nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)";
@@ -76,16 +74,16 @@ impl<'a> Stage<'a> {
         }
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(args.render.filter(&settings), &settings, &gpu)?;
-        render::check_stride(&args.render, &settings, &mut warnings)?;
+        render::check_stride(&args.render, &settings, warnings)?;
         render::tell_of_lens(&args.render, &scene);
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         let rest = survey.effects(&settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
         let own_seeds = args.seed_per_frame || reproject.is_some() || slides(args, &survey);
         let moves = Moves::of(&animation);
-        render::warn_of_unread(&args.render, &settings, &mut warnings);
+        render::warn_of_unread(&args.render, &settings, warnings);
         if reproject.is_none() {
-            render::warn_of_unplaced(&settings, &mut warnings);
+            render::warn_of_unplaced(&settings, warnings);
         }
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
         Ok(Self {
@@ -95,7 +93,6 @@ impl<'a> Stage<'a> {
             animation,
             frames,
             settings,
-            warnings: warnings.into_all(),
             framed,
             rest,
             renderer,
@@ -113,21 +110,22 @@ impl<'a> Stage<'a> {
         &self.frames
     }
 
-    /// What is odd in the scene, the frames and the options.
-    pub fn warnings(&self) -> &[String] {
-        &self.warnings
-    }
-
     /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 
     /// Renders a frame, if it is not finished. Nothing that fails here keeps later frames from being rendered.
-    pub fn frame(&mut self, number: u32, preview: Option<&mut Preview>) -> (FrameReport, Result<Exit>) {
+    pub fn frame(
+        &mut self,
+        number: u32,
+        preview: Option<&mut Preview>,
+        warnings: &mut Warnings,
+    ) -> (FrameReport, Result<Exit>) {
+        warnings.are_of(format!("frame {number}"));
         let begun = Instant::now();
         let mut report = FrameReport { frame: number, ..Default::default() };
-        let result = self.try_frame(number, preview, &mut report);
+        let result = self.try_frame(number, preview, &mut report, warnings);
         if let Err(e) = &result {
             report.error = Some(e.to_string());
             (self.chain, self.held) = (Chain::default(), None);
@@ -140,7 +138,13 @@ impl<'a> Stage<'a> {
         (report, result)
     }
 
-    fn try_frame(&mut self, number: u32, preview: Option<&mut Preview>, report: &mut FrameReport) -> Result<Exit> {
+    fn try_frame(
+        &mut self,
+        number: u32,
+        preview: Option<&mut Preview>,
+        report: &mut FrameReport,
+        warnings: &mut Warnings,
+    ) -> Result<Exit> {
         let (args, settings) = (self.args.of_frame(number)?, self.settings_of(number));
         let begun = Instant::now();
         self.pose(number, report)?;
@@ -162,7 +166,7 @@ impl<'a> Stage<'a> {
         if !carries {
             self.chain = Chain::default();
         }
-        let mut shot = self.shoot(&args, &settings, carries)?;
+        let mut shot = self.shoot(&args, &settings, carries, warnings)?;
         if let Some(shot) = &mut shot {
             shot.film_mut().metadata.insert(render::FRAME.to_owned(), number.to_string());
         }
@@ -171,7 +175,7 @@ impl<'a> Stage<'a> {
         if carries {
             report.carriage = Some(self.renderer()?.carriage()?);
         }
-        shot.finish(&args, None, false)?;
+        shot.finish(&args, None, false, warnings)?;
         show(preview, shot.film(), &args)?;
         self.chain = self.chain.with(&self.scene, &settings, self.reproject)?;
         self.held = self.reproject.map(|_| number);
@@ -193,10 +197,17 @@ impl<'a> Stage<'a> {
     }
 
     /// Takes the samples of a frame.
-    fn shoot(&self, args: &render::Args, settings: &Settings, carries: bool) -> Result<Option<render::Taken<'_>>> {
+    fn shoot(
+        &self,
+        args: &render::Args,
+        settings: &Settings,
+        carries: bool,
+        warnings: &mut Warnings,
+    ) -> Result<Option<render::Taken<'_>>> {
         let renderer = self.renderer()?;
         let job = Job { carries, ..Job::new(renderer) };
-        let mut shot = render::shoot(args, &self.gpu, job, Files::of_frame(), Spans::default())?;
+        let shot = render::Shot { args, gpu: &self.gpu, job };
+        let mut shot = render::shoot(shot, Files::of_frame(), Spans::default(), warnings)?;
         if let Some(shot) = shot.as_mut().filter(|_| self.reproject.is_some()) {
             renderer.add_history(shot.film_mut(), &self.scene)?;
             self.chain.tell(shot.film_mut(), &self.scene, settings, self.reproject)?;
