@@ -165,7 +165,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     check_room(args.filter(settings), settings, &gpu)?;
     check_stride(args, settings, &mut warnings)?;
-    tell_of_lens(args, &scene);
+    warn_of_lens(args, &scene, &mut warnings);
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, settings))?;
     if args.checkpoint.is_some() && !renderer.can_resume() {
         let what = "a film of this size cannot go on from a checkpoint on this device, which keeps the picture alone";
@@ -289,13 +289,10 @@ pub fn check_stride(args: &Args, settings: &Settings, warnings: &mut Warnings) -
 }
 
 /// What a lens blurs has noise, of which most filters leave that of sharp light, lamps and sky.
-pub fn tell_of_lens(args: &Args, scene: &Scene) {
-    let leaves = args.denoise.is_some_and(|method| method.leaves_noise_of_lens());
-    if leaves && light_and_camera_effects(scene).lens && args.common.talkative() {
-        complain(
-            "note: this filter leaves the noise of direct light, lamps and sky where the lens blurs them: auto and svgf filter it",
-        );
-    }
+pub fn warn_of_lens(args: &Args, scene: &Scene, warnings: &mut Warnings) {
+    let leaves = args.denoise.filter(|method| method.leaves_noise_of_lens() && light_and_camera_effects(scene).lens);
+    let what = "leaves the noise of direct light, lamps and sky where the lens blurs them: auto and svgf filter it";
+    warnings.add(leaves.map(|method| format!("{} {what}", method.name())));
 }
 
 #[cfg(test)]

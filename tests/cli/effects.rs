@@ -78,6 +78,12 @@ fn options_that_change_nothing_are_told() {
     assert_eq!(listed(&format!("{small} --window 3")), unread);
     let unplaced = "min-spp is 4: spp, 4, leaves no samples that both could place";
     assert_eq!(listed(&format!("{small} --allocate both --min-spp 4")), unplaced);
+    let lens = "[film]\nwidth = 8\nheight = 8\n[camera]\nposition = [0, 0, 2]\ntarget = [0, 0, 0]\nfocus_distance = 2\nlens_radius";
+    let file = folder.path().join("lens.toml");
+    std::fs::write(&file, format!("{lens} = 0.1\n[[mesh]]\nshape = 'rectangle'\n[environment]\n")).unwrap();
+    let blurred = listed("render lens.toml --spp 1 -o lens.exr --denoise atrous");
+    assert!(blurred.starts_with("atrous leaves the noise of direct light, lamps and sky"), "{blurred}");
+    assert_eq!(listed("render lens.toml --spp 1 -o lens.exr --denoise svgf"), "");
     let sparse = listed(&format!("{small} --indirect-stride 2"));
     assert!(sparse.contains("add --denoise"), "{sparse}");
     assert!(listed(&frames.replace("--allocate both", "--window 3")).contains(unread));

@@ -75,7 +75,7 @@ impl<'a> Stage<'a> {
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(args.render.filter(&settings), &settings, &gpu)?;
         render::check_stride(&args.render, &settings, warnings)?;
-        render::tell_of_lens(&args.render, &scene);
+        render::warn_of_lens(&args.render, &scene, warnings);
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         let rest = survey.effects(&settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
