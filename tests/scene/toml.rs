@@ -371,7 +371,7 @@ fn mistakes_are_one_line_with_place_and_remedy() {
         ("[environment]\nfile = \"sky.hdr\"", "sky.hdr: cannot be read"),
         ("[environment]\nradiance = -1", "[environment]"),
         ("[camera]\nfov = 200", "[camera]: fov is 200"),
-        ("film = 3", "line 1: invalid type"),
+        ("film = 3", "line 1: film takes a table, not 3"),
     ] {
         let found = error(text);
         assert!(found.contains(expected), "{text}\n  gave {found}\n  not  {expected}");

@@ -7,6 +7,7 @@
 //! [`Description::bitmap`], [`Description::picture_file`] and [`EnvironmentTable::picture`] in place of files.
 pub(super) mod animation;
 pub(super) mod camera;
+mod explain;
 pub(super) mod keys;
 pub(super) mod light;
 pub(super) mod material;
@@ -19,6 +20,8 @@ pub mod settings;
 pub use animation::{AnimationTable, Interpolation, Key, Numbers, numbered};
 pub(super) use animation::{mesh_number, meshes_to_free};
 pub use camera::{Camera, FovAxis};
+use explain::explain;
+pub(super) use explain::nearest;
 pub use light::{LightTable, Type as LightType};
 pub use material::{AlphaMode, Distribution, MaterialTable, Type as MaterialType};
 pub use mesh::{Bitmap, Mesh, PictureFile};
@@ -145,7 +148,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Description> {
     let description: Description = toml::from_str(text).map_err(|e| {
         let start = e.span().map_or(0, |s| s.start).min(text.len());
         let line = 1 + text.as_bytes()[..start].iter().filter(|&&b| b == b'\n').count();
-        Error::input_at(path, format!("line {line}"), explain(e.message()))
+        Error::input_at(path, format!("line {line}"), explain(text, start, e.message()))
     })?;
     let Camera { world_from_camera, position, up, .. } = &description.camera;
     if world_from_camera.is_some() && (position.is_some() || up.is_some()) {
@@ -162,56 +165,6 @@ impl Description {
         self.render.apply(&mut settings);
         settings
     }
-}
-
-/// "unknown field `widht`, expected one of `width`, `height`" becomes one line with the nearest name first.
-fn explain(message: &str) -> String {
-    let quoted: Vec<_> = message.split('`').skip(1).step_by(2).collect();
-    let kind = match message {
-        m if m.starts_with("unknown field") => "key",
-        m if m.starts_with("unknown variant") => "value",
-        m => return m.replace('\n', " "),
-    };
-    let (unknown, known) = quoted.split_first().unwrap_or((&"", &[]));
-    let hint = hint(unknown, known).map_or_else(|| ".".to_owned(), |hint| format!(": {hint}"));
-    let known = if known.is_empty() { String::new() } else { format!(" Known: {}", known.join(", ")) };
-    format!("unknown {kind} \"{unknown}\"{hint}{known}")
-}
-
-/// What a word stands for that is not among the known ones: what other renderers call so, or the known one most like it.
-fn hint(unknown: &str, known: &[&str]) -> Option<String> {
-    let of = |value| known.contains(&value);
-    let elsewhere = match unknown {
-        "area" | "rect" | "quad" | "disk" if of("directional") => {
-            return Some("what shines from an area is a mesh whose material has an emission.".to_owned());
-        }
-        "infinite" | "envmap" | "sky" | "dome" if of("directional") => {
-            return Some("what shines from all around is the table [environment].".to_owned());
-        }
-        "color" | "power" | "energy" | "strength" if of("irradiance") => {
-            return Some("a light has an intensity, or an irradiance where it is directional.".to_owned());
-        }
-        "sun" | "distant" => "directional",
-        "matte" | "lambertian" => "diffuse",
-        "metal" => "conductor",
-        "glass" => "dielectric",
-        "plastic" => "coated",
-        "pbr" | "principled" | "disney" => "metallic-roughness",
-        "position" | "translate" | "rotate" | "scale" | "matrix" => "transform",
-        _ => unknown,
-    };
-    let word = if of(elsewhere) { elsewhere } else { unknown };
-    let near = nearest(word, known.iter().copied())?;
-    (strsim::jaro_winkler(word, near) >= LEAST_LIKENESS).then(|| format!("did you mean \"{near}\"?"))
-}
-
-/// Words that are less alike, from 0 to 1, are not taken for one another: "sun" and "render" have .5.
-const LEAST_LIKENESS: f64 = 0.7;
-
-/// The name that is most like `word`.
-pub(super) fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let like = |name: &str| (strsim::jaro_winkler(word, name) * 1e6) as u32;
-    names.max_by_key(|name| like(name))
 }
 
 #[cfg(test)]
@@ -264,7 +217,7 @@ mod tests {
         let found = error("[allocate]\n\nwindwo = 3\n");
         assert!(found.starts_with("s.toml, line 3: unknown key \"windwo\": did you mean \"window\"?"), "{found}");
         assert!(error("[render]\nfirst_sample = 3").contains("line 2: unknown key"));
-        assert!(error("[allocate]\n\nfiltered = \"x\"").contains("line 3: invalid type"));
+        assert!(error("[allocate]\n\nfiltered = \"x\"").contains("line 3: filtered takes"));
         let found = error("[allocate]\npolicy = \"none\"");
         assert!(found.contains("line 2: no policy \"none\": choose one of uniform, geometry"), "{found}");
         let text = "[film]\nwidth = 8\n[allocate]\npolicy = \"both\"\nwindow = 3\nfiltered = 1\n";
@@ -279,9 +232,9 @@ mod tests {
 
     #[test]
     fn wrong_types_name_their_line() {
-        assert!(error("[film]\n\nwidth = \"wide\"").starts_with("s.toml, line 3: invalid type: string"));
+        assert!(error("[film]\n\nwidth = \"wide\"").starts_with("s.toml, line 3: width takes a whole number"));
         assert!(error("[film]\nwidth = -1").contains("line 2"));
-        assert!(error("[[light]]\nposition = [1, 2, 3]").contains("missing field `type`"));
+        assert!(error("[[light]]\nposition = [1, 2, 3]").contains("the key \"type\" is missing"));
         assert!(error("[film\n").starts_with("s.toml, line 1"));
         for text in ["[film]\nwidth = \"wide\"", "a = 1", "[[", "\u{0}"] {
             assert!(!error(text).contains('\n'), "{}", error(text));

@@ -1,7 +1,7 @@
 //! Values that a scene file may write in more than one way.
 use crate::error::Checked;
 use glam::{DAffine3, DMat4, DQuat, DVec3, EulerRot};
-use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor, value};
+use serde::de::{Deserialize, Deserializer, Error, Expected, MapAccess, SeqAccess, Unexpected, Visitor, value};
 use std::fmt;
 
 /// Three channels, written as `[r, g, b]` or as one number for all of them.
@@ -30,14 +30,15 @@ impl<'de> Deserialize<'de> for Rgb {
     }
 }
 
-/// Numbers in order: a fixed count, or an error that says how many were given.
-fn numbers<'de, const N: usize, A: SeqAccess<'de>>(mut seq: A, what: &str) -> Result<[f64; N], A::Error> {
+/// Numbers in order: a fixed count, or an error that says what is expected and how many were given.
+fn numbers<'de, const N: usize, A: SeqAccess<'de>>(mut seq: A, expected: &dyn Expected) -> Result<[f64; N], A::Error> {
     let mut found = Vec::with_capacity(N);
-    while let Some(v) = seq.next_element()? {
+    let other = |_| A::Error::invalid_type(Unexpected::Other("a list of something else"), expected);
+    while let Some(v) = seq.next_element().map_err(other)? {
         found.push(v);
     }
     let count = found.len();
-    found.try_into().map_err(|_| A::Error::custom(format!("{what} takes {N} numbers, not {count}")))
+    found.try_into().map_err(|_| A::Error::invalid_length(count, expected))
 }
 
 /// `{ translate, rotate, scale }`: scaled first, then rotated, then moved.
@@ -55,7 +56,9 @@ struct Rotation(DQuat);
 
 impl<'de> Deserialize<'de> for Rotation {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        rotation(&Vec::<f64>::deserialize(deserializer)?).map(Self).map_err(D::Error::custom)
+        let what = "rotate takes 3 angles in degrees, such as [0, 90, 0], or axis and angle, such as [0, 1, 0, 90]";
+        let numbers = Vec::<f64>::deserialize(deserializer).map_err(|_| D::Error::custom(what))?;
+        rotation(&numbers).map(Self).map_err(D::Error::custom)
     }
 }
 
@@ -86,6 +89,9 @@ impl<'de> Deserialize<'de> for Scale {
         Rgb::deserialize(deserializer).map(|Rgb(v)| Self(DVec3::from(v.map(f64::from))))
     }
 }
+
+const TRANSFORM: &str =
+    "16 numbers, row by row, or a table such as { translate = [0, 1, 0], rotate = [0, 90, 0], scale = 2 }";
 
 /// A placement: 16 row-major numbers (column vectors, last row 0 0 0 1) or `{ translate, rotate, scale }`.
 /// It may have no inverse: the code that uses it checks that and names the mesh.
@@ -167,10 +173,10 @@ impl<'de> Deserialize<'de> for Transform {
         impl<'de> Visitor<'de> for Either {
             type Value = Transform;
             fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("16 numbers or a table of translate, rotate, scale")
+                f.write_str(TRANSFORM)
             }
             fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Transform, A::Error> {
-                Transform::try_from(numbers::<16, A>(seq, "transform")?).map_err(A::Error::custom)
+                Transform::try_from(numbers::<16, A>(seq, &self)?).map_err(A::Error::custom)
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Transform, A::Error> {
                 let steps = Steps::deserialize(value::MapAccessDeserializer::new(map))?;
@@ -210,7 +216,7 @@ mod tests {
         let found = place("[1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1]", [0.0, 0.0, 0.0]);
         assert_eq!(found, [5.0, 6.0, 7.0]);
         let error = |text: &str| toml::from_str::<Row>(text).unwrap_err().message().to_owned();
-        assert!(error("t = [0, 0]").contains("16 numbers, not 2"));
+        assert!(error("t = [0, 0]").starts_with("invalid length 2, expected 16 numbers"));
         assert!(error("t = [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,1,1]").contains("last row"));
     }
 
@@ -229,7 +235,15 @@ mod tests {
     #[test]
     fn wrong_types_and_keys_are_named() {
         let error = |text: &str| toml::from_str::<Row>(text).unwrap_err().message().to_owned();
-        assert!(error("t = 5").contains("16 numbers or a table"));
+        assert!(error("t = 5").contains("16 numbers, row by row, or a table"));
+        for list in ["[{ scale = 2 }]", "[[1, 0, 0, 0], [0, 1, 0, 0]]", "['1']"] {
+            let said = error(&format!("t = {list}"));
+            assert!(
+                said.contains("list of something else, expected 16 numbers") && said.contains("{ translate"),
+                "{said}"
+            );
+        }
+        assert!(error("t = { rotate = 90 }").contains("rotate takes 3 angles in degrees, such as [0, 90, 0]"));
         assert!(error("t = { move = [1, 2, 3] }").contains("unknown field `move`"));
         assert!(error("t = { rotate = [1, 2] }").contains("rotate takes 3 angles"));
     }

@@ -1,0 +1,200 @@
+//! What is said of a mistake in a scene file, in words that need no knowledge of the parser.
+
+/// The parser's `message` about what is at byte `at` of `text`, in one line that says what is expected there.
+pub(super) fn explain(text: &str, at: usize, message: &str) -> String {
+    wrong_table(text, at, message)
+        .or_else(|| wrong_type(text, at, message))
+        .or_else(|| unknown(message))
+        .or_else(|| syntax(message))
+        .unwrap_or_else(|| message.replace('\n', " "))
+}
+
+/// "unknown field `widht`, expected one of `width`, `height`" becomes one line with the nearest name first.
+fn unknown(message: &str) -> Option<String> {
+    let kind = match message {
+        m if m.starts_with("unknown field") => "key",
+        m if m.starts_with("unknown variant") => "value",
+        _ => return None,
+    };
+    let quoted: Vec<_> = message.split('`').skip(1).step_by(2).collect();
+    let (unknown, known) = quoted.split_first().unwrap_or((&"", &[]));
+    let hint = hint(unknown, known).map_or_else(|| ".".to_owned(), |hint| format!(": {hint}"));
+    let known = if known.is_empty() { String::new() } else { format!(" Known: {}", known.join(", ")) };
+    Some(format!("unknown {kind} \"{unknown}\"{hint}{known}"))
+}
+
+/// A header with one pair of brackets in place of two, or the other way.
+fn wrong_table(text: &str, at: usize, message: &str) -> Option<String> {
+    let (name, is_double) = header(text, at).filter(|_| message.starts_with("invalid type"))?;
+    match (is_double, LISTS.contains(&name)) {
+        (true, false) => Some(format!("there is only one {name}: write [{name}]")),
+        (false, true) => Some(format!("there may be several of {name}: write [[{name}]]")),
+        _ => None,
+    }
+}
+
+/// Tables of which there may be several.
+const LISTS: [&str; 6] = ["mesh", "instance", "material", "light", "animation", "animation.keys"];
+
+/// The name of the table whose header begins at byte `at`, and whether that is one of several.
+fn header(text: &str, at: usize) -> Option<(&str, bool)> {
+    let before = text.get(..at)?.rsplit('\n').next()?;
+    let header = text.get(at..)?.lines().next()?.trim();
+    let name = header.trim_start_matches('[').split(']').next()?.trim();
+    let is_one = before.trim().is_empty() && header.starts_with('[') && name.starts_with(char::is_alphabetic);
+    is_one.then_some((name, header.starts_with("[[")))
+}
+
+/// "invalid type: map, expected f64" becomes what the key takes, with an example, and what it was given.
+fn wrong_type(text: &str, at: usize, message: &str) -> Option<String> {
+    let starts = ["invalid type: ", "invalid value: ", "invalid length "];
+    let rest = starts.iter().find_map(|start| message.strip_prefix(start))?;
+    let (found, expected) = rest.rsplit_once(", expected ")?;
+    let expected = match expected {
+        "f32" | "f64" => "a number, such as 0.5".to_owned(),
+        "u32" => "a whole number from 0 to 4294967295".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a string" | "path string" => "a text in quotes, such as \"name\"".to_owned(),
+        "a sequence" => "a list in brackets".to_owned(),
+        other => match other.strip_prefix("an array of length ") {
+            Some(count) => {
+                format!("{count} numbers in brackets{}", if count == "3" { ", such as [0, 1, 0]" } else { "" })
+            }
+            None if other.starts_with("struct ") => "a table, such as { key = value }".to_owned(),
+            None => other.to_owned(),
+        },
+    };
+    let found = match found {
+        "map" => "a table",
+        "sequence" => "a list",
+        count if message.starts_with(starts[2]) => &format!("{count} values"),
+        text if text.starts_with("string ") => text.trim_start_matches("string "),
+        // As in "integer `-1`".
+        value => value.split('`').nth(1).unwrap_or(value),
+    };
+    let of_header = || header(text, at)?.0.rsplit('.').next();
+    Some(match key_before(text, at).or_else(of_header) {
+        Some(key) => format!("{key} takes {expected}, not {found}"),
+        None => format!("{expected} is expected here, not {found}"),
+    })
+}
+
+/// The key of the value that begins at byte `at`, or of the list of numbers in which it stands.
+fn key_before(text: &str, at: usize) -> Option<&str> {
+    let is_of_list = |c: char| c.is_whitespace() || c.is_ascii_digit() || "[,.+-".contains(c);
+    let before = text.get(..at)?.trim_end_matches(is_of_list).strip_suffix('=')?.trim_end();
+    let is_of_key = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    Some(before.rsplit(|c| !is_of_key(c)).next()?).filter(|key| !key.is_empty())
+}
+
+/// What the parser says of words without quotes and of lists without commas leads astray.
+fn syntax(message: &str) -> Option<String> {
+    let field =
+        message.strip_prefix("missing field ").map(|field| format!("the key {} is missing", field.replace('`', "\"")));
+    let said = match message.lines().next()? {
+        m if m.starts_with("string values must be quoted") => {
+            "texts stand in quotes, and the values of a list have commas between them"
+        }
+        m if m.starts_with("invalid boolean") => "texts stand in quotes, and true and false are written so",
+        m if m.starts_with("wanted exactly 1 element") || m.starts_with("wanted string") => {
+            "a text in quotes is expected here"
+        }
+        m if m.contains("untagged enum Numbers") => "a key takes a number or a list of numbers",
+        _ => return field,
+    };
+    Some(said.to_owned())
+}
+
+/// What a word stands for that is not among the known ones: what other renderers call so, or the known one most like it.
+fn hint(unknown: &str, known: &[&str]) -> Option<String> {
+    let of = |value| known.contains(&value);
+    let elsewhere = match unknown {
+        "area" | "rect" | "quad" | "disk" if of("directional") => {
+            return Some("what shines from an area is a mesh whose material has an emission.".to_owned());
+        }
+        "infinite" | "envmap" | "sky" | "dome" if of("directional") => {
+            return Some("what shines from all around is the table [environment].".to_owned());
+        }
+        "color" | "power" | "energy" | "strength" if of("irradiance") => {
+            return Some("a light has an intensity, or an irradiance where it is directional.".to_owned());
+        }
+        "sun" | "distant" => "directional",
+        "matte" | "lambertian" => "diffuse",
+        "metal" => "conductor",
+        "glass" => "dielectric",
+        "plastic" => "coated",
+        "pbr" | "principled" | "disney" => "metallic-roughness",
+        "position" | "translate" | "rotate" | "scale" | "matrix" => "transform",
+        _ => unknown,
+    };
+    let word = if of(elsewhere) { elsewhere } else { unknown };
+    let near = nearest(word, known.iter().copied())?;
+    (strsim::jaro_winkler(word, near) >= LEAST_LIKENESS).then(|| format!("did you mean \"{near}\"?"))
+}
+
+/// Words that are less alike, from 0 to 1, are not taken for one another: "sun" and "render" have .5.
+const LEAST_LIKENESS: f64 = 0.7;
+
+/// The name that is most like `word`.
+pub(in crate::scene) fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let like = |name: &str| (strsim::jaro_winkler(word, name) * 1e6) as u32;
+    names.max_by_key(|name| like(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::description::parse;
+    use std::path::Path;
+
+    #[track_caller]
+    fn says(text: &str, expected: &str) {
+        let error = parse(Path::new("s.toml"), text).unwrap_err().to_string();
+        assert!(error.contains(expected), "{text}: {error}");
+        assert!(!error.contains("f64") && !error.contains("sequence") && !error.contains("struct"), "{text}: {error}");
+    }
+
+    #[test]
+    fn values_of_another_type_are_told_with_key_and_example() {
+        let placed =
+            "line 3: transform takes 16 numbers, row by row, or a table such as { translate = [0, 1, 0], rotate =";
+        for list in ["[{ scale = 2 }]", "[1, 2, 3]", "[[1, 0, 0, 0]]", "'up'", "2"] {
+            says(&format!("[[mesh]]\nshape = 'cube'\ntransform = {list}"), placed);
+        }
+        let moved = "line 2: translate takes 3 numbers in brackets, such as [0, 1, 0], not a table";
+        says("[[mesh]]\ntransform = { translate = { x = 1 } }", moved);
+        says("[camera]\nposition = [\n  0,\n  'a', 2]", "line 4: position takes a number, such as 0.5, not \"a\"");
+        says("[camera]\nposition = [0, 1]", "position takes 3 numbers in brackets, such as [0, 1, 0], not 2 values");
+        says("[camera]\nfov = '45'", "fov takes a number, such as 0.5, not \"45\"");
+        says("[render]\nspp = 16.0", "spp takes a whole number from 0 to 4294967295, not 16.0");
+        says("[render]\nspp = -1", "spp takes a whole number from 0 to 4294967295, not -1");
+        says("[[mesh]]\nflat = 1", "flat takes true or false, not 1");
+        says("[[mesh]]\nfile = ['a.obj']", "file takes a text in quotes, such as \"name\", not a list");
+        says("[[mesh]]\nshape = { type = 'cube', size = 2 }", "a text in quotes is expected here");
+        says("[[material]]\ncolor = '#ff0000'", "color takes a number or [r, g, b], not \"#ff0000\"");
+        says("environment = 'a.hdr'", "environment takes a table, such as { key = value }, not \"a.hdr\"");
+        says("[[animation]]\nkeys = [{ time = 0, fov = 'a' }]", "a key takes a number or a list of numbers");
+        says("[[instance]]\n", "the key \"mesh\" is missing");
+    }
+
+    #[test]
+    fn headers_have_as_many_brackets_as_there_may_be_tables() {
+        says("[film]\n[mesh]\nshape = 'cube'", "line 2: there may be several of mesh: write [[mesh]]");
+        says("[[film]]\nwidth = 8", "line 1: there is only one film: write [film]");
+        says("[[camera]]\nposition = [0, 0, 3]", "line 1: there is only one camera: write [camera]");
+        says(
+            "[[mesh]]\n[[mesh.transform]]\nscale = 2",
+            "line 2: there is only one mesh.transform: write [mesh.transform]",
+        );
+        says("[[animation]]\n[animation.keys]\ntime = 0", "line 2: there may be several of animation.keys: write [[");
+        says("[[animation]]\n[[animation.keys]]\ntime = 'a'", "takes a number, such as 0.5, not \"a\"");
+        says("[[material]]\n[material.color]\nr = 1", "color takes a number or [r, g, b], not a table");
+    }
+
+    #[test]
+    fn words_without_quotes_and_lists_without_commas_are_told() {
+        says("[film]\nfilter = tent", "line 2: texts stand in quotes");
+        says("[[mesh]]\nfile = a.obj", "line 2: texts stand in quotes");
+        says("[camera]\nposition = [0 0 3]", "the values of a list have commas between them");
+        says("[[mesh]]\nflat = True", "true and false are written so");
+    }
+}
