@@ -20,6 +20,10 @@ pub fn percent(share: f64) -> String {
     if percent.abs() >= 1e9 {
         return format!("{percent:.1e} %");
     }
+    if percent.abs() >= 100.0 {
+        let unit = 10f64.powf(percent.abs().log10().floor() - 1.0);
+        return format!("{:.0} %", (percent / unit).round() * unit);
+    }
     let digits = (1.0 - percent.abs().max(1e-4).log10().floor()).clamp(0.0, 4.0) as usize;
     format!("{percent:.digits$} %")
 }
@@ -70,7 +74,7 @@ fn numbers(report: &Report, times: f64) -> String {
         Noise::SquaredErrors(_) => None,
     });
     let Some((a, b)) = a.zip(b) else { return String::new() };
-    let needed = |n: f64| whole((n * times).ceil());
+    let needed = |n: f64| whole(two_digits_up(n * times).ceil());
     match (a.max(b) - a.min(b)) / a.max(b) < UNEQUAL {
         true => format!(", {} a pixel", needed(a)),
         false => format!(", {} and {} a pixel (fewer if both have equally many)", needed(a), needed(b)),
@@ -113,11 +117,15 @@ pub fn plural(scale: Scale) -> String {
     }
 }
 
-/// Two significant digits, rounded up: fewer samples would not do.
+/// As text with two significant digits, rounded up: fewer samples would not do.
 fn rounded_up(samples: f64) -> String {
-    let unit = 10f64.powf(samples.log10().floor() - 1.0);
-    let rounded = (samples / unit).ceil() * unit;
+    let rounded = two_digits_up(samples);
     if rounded < 9.95 { format!("{rounded:.1}") } else { whole(rounded) }
+}
+
+fn two_digits_up(number: f64) -> f64 {
+    let unit = 10f64.powf(number.log10().floor() - 1.0);
+    (number / unit).ceil() * unit
 }
 
 /// A whole number, by its power of ten where nobody counts the digits.
@@ -159,8 +167,8 @@ mod tests {
 
     #[test]
     fn numbers_have_two_digits_that_mean_something() {
-        let shown = [1.234, 0.3456, 0.0123, -0.00256, 1e-5, 0.0].map(percent);
-        assert_eq!(shown, ["123 %", "35 %", "1.2 %", "-0.26 %", "0.0010 %", "0.0000 %"]);
+        let shown = [1.234, -456.7, 0.3456, 0.0123, -0.00256, 1e-5, 0.0].map(percent);
+        assert_eq!(shown, ["120 %", "-46000 %", "35 %", "1.2 %", "-0.26 %", "0.0010 %", "0.0000 %"]);
         assert_eq!([1.01, 5.31, 9.99, 123.0].map(rounded_up), ["1.1", "5.4", "10", "130"]);
     }
 }
