@@ -166,7 +166,10 @@ fn samples_that_are_no_numbers_are_told_and_add_up() {
     let (listed, printed) = warned(&frames);
     let of_frames = [0, 1].map(|frame| said.replace("warning: ", &format!("warning: frame {frame}: "))).concat();
     assert_eq!(printed, of_frames, "each says of which frame it is");
-    assert!(listed.starts_with("warning: nothing moves") && listed.ends_with(&of_frames), "{listed}");
+    assert!(
+        listed.starts_with("warning: all frames are alike: nothing moves") && listed.ends_with(&of_frames),
+        "{listed}"
+    );
     let beside = run(&folder, "render s.toml --filter box --quiet -o d.exr");
     assert!(beside.stderr.is_empty() && told("d.exr").is_none(), "control: beside it there is light: {beside:?}");
 }

@@ -259,9 +259,21 @@ fn without_frames_all_of_the_animation_is_rendered() {
     assert!(told.contains("frame 0: ") && !told.contains("frame 1"), "a frame may last longer than all keys: {told}");
     let still = "[[mesh]]\nshape = \"cube\"\n[environment]\n";
     fs::write(folder.path().join("s.toml"), still).unwrap();
-    let output = run(&folder, "-o n.#.png --turntable 90 --quiet");
+    let refused = |said: &str| {
+        let output = run(&folder, "-o n.#.png --turntable 90 --quiet");
+        let line = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && line.contains(said), "{line}");
+    };
+    refused("nothing moves; give --frames");
+    let one_key = format!("{still}[[animation]]\ncamera = true\nkeys = [{{ time = 0, position = [0, 0, 9] }}]\n");
+    fs::write(folder.path().join("s.toml"), one_key).unwrap();
+    refused("what moves has one pose, that of time 0; give --frames 0..1");
+    let output = run(&folder, "-o one.#.png --frames 0..1");
     let line = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.code() == Some(2) && line.contains("nothing moves; give --frames"), "{line}");
+    assert!(
+        output.status.success() && line.contains("warning: all frames are alike: what moves has one pose"),
+        "{line}"
+    );
 }
 
 /// Seconds are whole numbers here, so that angles have the same bits.

@@ -68,10 +68,12 @@ impl<'a> Stage<'a> {
             animation.movers.push(Arc::new(Turntable::new(&scene, settings.size(), degrees, span)));
         }
         warnings.add(scene.warnings.clone());
-        if animation.is_empty() {
-            let what = "nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)";
-            warnings.add([what.to_owned()]);
-        }
+        let still = match animation.end() {
+            _ if animation.is_empty() => Some("nothing moves in the scene (add [[animation]] tables, or --turntable)"),
+            0.0 => Some("what moves has one pose, that of time 0 (give later keys, another --clip, or --turntable)"),
+            _ => None,
+        };
+        warnings.add(still.map(|why| format!("all frames are alike: {why}")));
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(args.render.filter(&settings), &settings, &gpu)?;
         render::check_stride(&args.render, &settings, warnings)?;
@@ -301,7 +303,11 @@ impl<'a> Stage<'a> {
 fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
     let last = animation.last_frame(fps);
     if animation.end() == 0.0 {
-        return Err(Error::Usage("how many frames there are is not known: nothing moves; give --frames 0..96".into()));
+        let how = match animation.is_empty() {
+            true => "nothing moves; give --frames 0..96",
+            false => "what moves has one pose, that of time 0; give --frames 0..1 for it, or another --clip",
+        };
+        return Err(Error::Usage(format!("how many frames there are is not known: {how}")));
     }
     if last >= MOST_FRAMES as f64 {
         return Err(Error::Usage(format!("{last} frames last to the end of what moves: choose some by --frames")));
