@@ -299,6 +299,7 @@ pub fn warn_of_lens(args: &Args, scene: &Scene, warnings: &mut Warnings) {
 mod tests {
     use super::*;
     use crate::cli::interrupt;
+    use crate::gpu::DeviceOptions;
     use crate::image::Film;
     use clap::Parser;
     use std::path::Path;
@@ -334,6 +335,17 @@ mod tests {
         assert_eq!(parse(&["a.toml", "--tonemap", "aces"]).png.write_options().tone_map, image::tone::ToneMap::Aces);
         let counted = |words: &[&str]| parse(&[&["a.toml"], words].concat()).wanted().counters;
         assert_eq!([counted(&["--counters"]), counted(&[])], [true, false]);
+    }
+
+    #[test]
+    fn a_film_that_no_host_has_room_for_is_told_as_memory() {
+        let gpu = Gpu::open(&DeviceOptions::default()).unwrap();
+        // 4 EiB for each 1024 bytes of a pixel; the scene file and the options have no such films.
+        let of_edge = |edge| Settings { width: edge, height: edge, ..Settings::default() };
+        assert!(check_room(None, &of_edge(8), &gpu).is_ok());
+        let error = check_room(None, &of_edge(1 << 26), &gpu).unwrap_err();
+        let line = error.to_string();
+        assert!(matches!(error, Error::Memory(_)) && line.starts_with("a film of 67108864 x 67108864 needs"), "{line}");
     }
 
     #[test]

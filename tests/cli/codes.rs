@@ -1,5 +1,5 @@
 //! Tests the built program's exit codes, and that errors are one readable line.
-use crate::command::{complains, names, stdout, tallow};
+use crate::command::{complains, names, scene, stdout, tallow};
 use crate::flat;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -417,6 +417,19 @@ fn files_that_claim_much_take_little_memory() {
         4,
         &["medium.exr", "of memory"],
     );
+}
+
+/// 79.2 GiB of a film within 4 GB of addresses: nothing of it can be taken before the check by mistake and go unseen.
+#[cfg(target_os = "linux")]
+#[test]
+fn films_without_room_in_memory_are_refused_before_a_sample() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = format!("{} --width 16384 --height 16384 --spp 1 --quiet", scene());
+    for words in ["render", "render --denoise atrous", "sequence --frames 0..1 -o a.#.exr", "profile --frames 1"] {
+        let refused = within(4_000_000, &folder, &format!("{words} {film}"));
+        complains(&refused, 4, &["error: a film of 16384 x 16384 needs", "of memory", "choose a smaller film"]);
+    }
+    assert!(names(folder.path()).is_empty());
 }
 
 #[test]
