@@ -171,6 +171,8 @@ mod tests {
         says("[[mesh]]\nfile = ['a.obj']", "file takes a text in quotes, such as \"name\", not a list");
         says("[[mesh]]\nshape = { type = 'cube', size = 2 }", "a text in quotes is expected here");
         says("[[material]]\ncolor = '#ff0000'", "color takes a number or [r, g, b], not \"#ff0000\"");
+        says("[[material]]\ncolor = [1, 0, 0, 1]", "line 2: color takes a number or [r, g, b], not 4 values");
+        says("[[mesh]]\ntransform = { scale = [1, 2, 3, 4] }", "scale takes a number or [x, y, z], not 4 values");
         says("environment = 'a.hdr'", "environment takes a table, such as { key = value }, not \"a.hdr\"");
         says("[[animation]]\nkeys = [{ time = 0, fov = 'a' }]", "a key takes a number or a list of numbers");
         says("[[instance]]\n", "the key \"mesh\" is missing");

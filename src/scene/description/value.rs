@@ -10,24 +10,29 @@ pub struct Rgb(pub [f32; 3]);
 
 impl<'de> Deserialize<'de> for Rgb {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Channels;
-        impl<'de> Visitor<'de> for Channels {
-            type Value = Rgb;
-            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("a number or [r, g, b]")
-            }
-            fn visit_f64<E: Error>(self, v: f64) -> Result<Rgb, E> {
-                Ok(Rgb([v as f32; 3]))
-            }
-            fn visit_i64<E: Error>(self, v: i64) -> Result<Rgb, E> {
-                Ok(Rgb([v as f32; 3]))
-            }
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Rgb, A::Error> {
-                Deserialize::deserialize(value::SeqAccessDeserializer::new(seq)).map(Rgb)
-            }
-        }
-        deserializer.deserialize_any(Channels)
+        one_or_three(deserializer, "a number or [r, g, b]").map(Self)
     }
+}
+
+/// Three numbers, or one in place of all, which is what is `expected`.
+fn one_or_three<'de, D: Deserializer<'de>>(deserializer: D, expected: &'static str) -> Result<[f32; 3], D::Error> {
+    struct OneOrThree(&'static str);
+    impl<'de> Visitor<'de> for OneOrThree {
+        type Value = [f32; 3];
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str(self.0)
+        }
+        fn visit_f64<E: Error>(self, v: f64) -> Result<[f32; 3], E> {
+            Ok([v as f32; 3])
+        }
+        fn visit_i64<E: Error>(self, v: i64) -> Result<[f32; 3], E> {
+            Ok([v as f32; 3])
+        }
+        fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<[f32; 3], A::Error> {
+            numbers(seq, &self).map(|v| v.map(|v| v as f32))
+        }
+    }
+    deserializer.deserialize_any(OneOrThree(expected))
 }
 
 /// Numbers in order: a fixed count, or an error that says what is expected and how many were given.
@@ -86,7 +91,7 @@ struct Scale(DVec3);
 
 impl<'de> Deserialize<'de> for Scale {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Rgb::deserialize(deserializer).map(|Rgb(v)| Self(DVec3::from(v.map(f64::from))))
+        one_or_three(deserializer, "a number or [x, y, z]").map(|v| Self(DVec3::from(v.map(f64::from))))
     }
 }
 
