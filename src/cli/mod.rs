@@ -6,6 +6,7 @@ pub mod compare;
 pub mod cost;
 mod crash;
 pub mod devices;
+mod elsewhere;
 pub mod explain;
 pub mod files;
 pub mod filter;
@@ -141,15 +142,20 @@ fn usage(e: &clap::Error, words: &[OsString]) -> Result<Exit> {
         ));
     }
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
+    let command = Cli::command();
+    let subcommand = words.get(1).and_then(|word| command.find_subcommand(word));
+    let tip = elsewhere::tip(e, subcommand);
     // Of an option that needs another one only the usage says the name.
     let tells = |p: &String| match e.kind() {
         ErrorKind::MissingRequiredArgument => !p.starts_with("For more"),
-        _ => !["Usage:", "For more", "tip: to pass"].iter().any(|words| p.starts_with(words)),
+        _ if p.starts_with("tip:") => tip.is_none() && !p.starts_with("tip: to pass"),
+        _ => !["Usage:", "For more"].iter().any(|words| p.starts_with(words)),
     };
     let parts = text.split("\n\n").map(one_line).filter(tells);
-    let message = parts.collect::<Vec<_>>().join("; ");
-    let (message, command) = (message.trim_start_matches("error: "), Cli::command());
-    let subcommand = words.get(1).and_then(|word| command.find_subcommand(word));
+    let message = parts.chain(tip.iter().map(|tip| format!("tip: {tip}"))).collect::<Vec<_>>().join("; ");
+    // As the standard library says of a whole number.
+    let message = message.replace("invalid digit found in string", "expected a whole number");
+    let message = message.trim_start_matches("error: ");
     let subcommand = subcommand.map_or_else(String::new, |found| format!("{} ", found.get_name()));
     Err(Error::Usage(format!("{message} (see tallow {subcommand}--help)")))
 }

@@ -39,6 +39,20 @@ fn usage_errors_are_one_line_and_exit_2() {
     let limited = run(&["compare", "a.exr", "b.exr", "--statistical", "--max-mse", "1"]);
     complains(&limited, 2, &["'--statistical' cannot be used with '--max-mse <N>'"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--max-mes", "1"]), 2, &["'--max-mes'", "tip:", "'--max-mse'"]);
+    // Words of other programs, of which the most alike by their letters were "--sampler" and "--counters".
+    std::fs::write(folder.path().join("my s.toml"), "").unwrap();
+    for (words, tip) in [
+        ("render s.toml --samples 4", "'--samples' found; tip: here that is --spp (see"),
+        ("render s.toml --bounces 4", "tip: here that is --max-depth (see"),
+        ("render s.toml --resolution 64x64", "tip: here that is --width, --height (see"),
+        ("render s.toml a.png", "'a.png' found; tip: what is written is named by -o a.png (see"),
+        ("compare a.exr b.exr --threshold 1", "tip: here that is --max-mse, --max-relmse, --max-flip, "),
+        ("denoise a.exr", "'denoise'; tip: here that is tallow filter (see"),
+        ("render s.toml --spp 1e3", "expected a whole number (see"),
+    ] {
+        complains(&run(&words.split(' ').collect::<Vec<_>>()), 2, &[tip]);
+    }
+    complains(&run(&["my s.toml"]), 2, &["tip: to render it, tallow render 'my s.toml' (see tallow --help)"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--min-psnr", "nan"]), 2, &["finite"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--diff", "d.exr"]), 2, &["d.exr", ".png"]);
     complains(&run(&["render", "s.toml", "-o", "a.tif"]), 2, &["a.tif", ".exr", ".png", ".hdr"]);
