@@ -25,18 +25,27 @@ printf '#!/bin/sh\necho \"built $*\"\n' >\"$target/release/tallow\"
 chmod +x \"$target/release/tallow\"
 ";
 
-/// Stands for cargo where it packages, and builds the package, which fails where there is a glslc.
+/// Stands for cargo where it packages, and checks the package, which fails where there is a glslc. What the package is built of is that of
+/// the repository, but for what a file `damage` is added to.
 const PACKAGES: &str = "#!/bin/sh
+makes() {
+    printf '%s\\n' \"include_bytes!($1/spirv/path.spv)\" >\"$1/shaders.rs\"
+    printf '{\"reason\":\"build-script-executed\",\"package_id\":\"tallow\",\"out_dir\":\"%s\"}' \"$1\"
+}
 case \"$*\" in
-*--offline*) if command -v glslc; then exit 1; fi ;;
+*--offline*)
+    if [ -n \"$(command -v glslc)\" ]; then exit 1; fi
+    makes \"$CARGO_TARGET_DIR/packaged\" ;;
 *--lib*)
-    mkdir -p \"$CARGO_TARGET_DIR/out/spirv\"
-    : >\"$CARGO_TARGET_DIR/out/spirv/path.spv\"
-    message='{\"reason\":\"build-script-executed\",\"package_id\":\"tallow\",\"out_dir\":\"%s\"}'
-    printf \"$message\" \"$CARGO_TARGET_DIR/out\" ;;
+    for out in out packaged; do
+        mkdir -p \"$CARGO_TARGET_DIR/$out/spirv\"
+        : >\"$CARGO_TARGET_DIR/$out/spirv/path.spv\"
+    done
+    if [ -e damage ]; then cp damage \"$CARGO_TARGET_DIR/packaged/$(cat damage)\"; fi
+    makes \"$CARGO_TARGET_DIR/out\" ;;
 package*)
     mkdir -p \"$CARGO_TARGET_DIR/package\"
-    tar -czf \"$CARGO_TARGET_DIR/package/tallow-1.crate\" spirv ;;
+    tar -czf \"$CARGO_TARGET_DIR/package/tallow-1.crate\" --transform 's,^,tallow-1/,' spirv src ;;
 esac
 ";
 
@@ -151,13 +160,18 @@ fn a_program_that_another_build_has_replaced_is_built_again() {
 }
 
 #[test]
-fn a_package_is_built_without_a_glslc_that_lies_beside_cargo() {
+fn a_package_is_checked_without_a_glslc_that_lies_beside_cargo() {
     let scripts = Scripts::new(&["tools/package"]);
+    fs::create_dir_all(scripts.path("repository/src")).unwrap();
     scripts.stand_in("bin/cargo", PACKAGES);
     scripts.stand_in("bin/glslc", "");
     scripts.stand_in("repository/target/release/tallow", "#!/bin/sh\nfor file; do :; done\necho picture >\"$file\"\n");
     let [_, err] = said(scripts.command("tools/package").arg("--check"));
-    assert!(err.contains("1 kernels") && err.ends_with("builds without glslc and renders\n"), "{err}");
+    assert!(err.contains("1 kernels") && err.ends_with("is the program of the repository and renders\n"), "{err}");
+    fs::write(scripts.path("repository/damage"), "spirv/path.spv").unwrap();
+    let output = scripts.command("tools/package").arg("--check").output().unwrap();
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && err.ends_with("the packaged crate differs from the repository\n"), "{err}");
 }
 
 #[test]
