@@ -1,4 +1,5 @@
-//! Loads a mesh of ten million triangles, alone in its process, so that its memory can be measured.
+//! Loads a mesh of four million triangles, alone in its process, so that its memory can be measured: as many as it takes for what
+//! grows with them to leave all else behind, and to be beyond the 128 MiB that a storage binding has at least.
 #![cfg(target_os = "linux")]
 mod support;
 
@@ -34,16 +35,16 @@ fn peak_memory() -> Option<u64> {
 }
 
 #[test]
-fn ten_million_triangles_load_within_four_gibibytes_and_render() {
+fn four_million_triangles_load_within_430_bytes_each_and_render() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("grid.obj");
-    write_grid(&path, 2237).unwrap();
+    write_grid(&path, 1415).unwrap();
     let start = Instant::now();
     let scene = Scene::load(&path).map(|scene| scene.with(|s| (s.width, s.height, s.spp) = (32, 18, 1))).unwrap();
-    assert!(scene.triangles.len() > 10_000_000);
-    let peak = peak_memory().expect("Linux tells") as f64 / f64::from(1 << 30);
-    println!("{} triangles in {:.1} s, peak {peak:.2} GiB", scene.triangles.len(), start.elapsed().as_secs_f64());
-    assert!(peak < 4.0);
+    assert!(scene.triangles.len() > 4_000_000);
+    let each = peak_memory().expect("Linux tells") as f64 / scene.triangles.len() as f64;
+    println!("{} triangles in {:.1} s, {each:.0} bytes each", scene.triangles.len(), start.elapsed().as_secs_f64());
+    assert!(each < 430.0); // 4 GiB for ten million
     let gpu = support::gpu();
     let renderer =
         Renderer::new(&gpu, &scene, &scene.settings, Outputs { guides: true, ..Outputs::default() }).unwrap();
