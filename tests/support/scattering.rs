@@ -1,6 +1,8 @@
 //! The share of light that one scattering by microfacets keeps, by quadrature in f64.
 use glam::{DVec2, DVec3, Vec3, dvec2, dvec3};
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
+use std::sync::Mutex;
 use tallow::layout::{BSDF_COATED, BSDF_DIELECTRIC};
 use tallow::twins::bsdf::{Bsdf, SMOOTH_ALPHA};
 
@@ -139,16 +141,28 @@ fn interface(b: &Bsdf, eta: f64, c: f64, through: bool) -> f64 {
     grid.integrate(|wi| microfacets(b, eta, wo, wi.as_dvec3())).iter().sum()
 }
 
-/// What a coat's white base gives back of one unit along wo: what the coat lets in, of that what it lets out, and all that
-/// comes of what it reflects inside, 1 / (1 - mean of R inside). By reciprocity, out of a medium goes 1 / eta^2 of the
-/// mean that comes into it.
+/// What a coat's white base gives back of one unit along wo: what the coat lets in, and of that what comes out.
 fn under_coat(b: &Bsdf, wo: Vec3) -> f64 {
-    let eta = f64::from(b.eta.x);
-    let mean = |eta: f64, through: bool| {
-        let cosines = (0..16).map(|i| (f64::from(i) + 0.5) / 16.0);
-        cosines.map(|c| 2.0 * c * interface(b, eta, c, through) / 16.0).sum::<f64>()
-    };
-    interface(b, eta, f64::from(wo.z), true) * mean(eta, true) / (eta * eta * (1.0 - mean(1.0 / eta, false)))
+    interface(b, f64::from(b.eta.x), f64::from(wo.z), true) * out_of_coat(b)
+}
+
+/// What comes out of one unit that a coat has let in: what it lets out, and all that comes of what it reflects inside, 1 / (1 - mean of
+/// R inside). By reciprocity, out of a medium goes 1 / eta^2 of the mean that comes into it. Kept for other directions of the
+/// same coat, since it takes 32 times what one direction does.
+fn out_of_coat(b: &Bsdf) -> f64 {
+    static KEPT: Mutex<BTreeMap<([u32; 3], bool), f64>> = Mutex::new(BTreeMap::new());
+    let coat = ([b.alpha, b.stretch, b.eta.x].map(f32::to_bits), b.ggx);
+    let kept = KEPT.lock().unwrap().get(&coat).copied();
+    kept.unwrap_or_else(|| {
+        let eta = f64::from(b.eta.x);
+        let mean = |eta: f64, through: bool| {
+            let cosines = (0..16).map(|i| (f64::from(i) + 0.5) / 16.0);
+            cosines.map(|c| 2.0 * c * interface(b, eta, c, through) / 16.0).sum::<f64>()
+        };
+        let share = mean(eta, true) / (eta * eta * (1.0 - mean(1.0 / eta, false)));
+        KEPT.lock().unwrap().insert(coat, share);
+        share
+    })
 }
 
 /// Flux that is left of one unit along wo, reflected and refracted; of a coat, reflected alone.
