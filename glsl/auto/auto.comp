@@ -52,6 +52,21 @@ const float ENOUGH_TO_TELL_ONE = 8.0;
 const float ENOUGH_TO_DOUBT = 4.0;
 const float MAX_ERROR = 1e24; // is above every error
 
+// Mean products of what left-out pixels are missed by. An independent copy of the pixel misses it by the noise of both, and shares the
+// pixel's own noise with every filter's error.
+float[5][5] mean_products(vec4 square, vec4 product, vec4 other, float noise) {
+    float unseen = optimism_of(noise);
+    product.z += unseen;
+    other.xy += unseen;
+    square.w += 2.0 * unseen;
+    return float[][](
+        float[](2.0 * noise, noise, noise, noise, noise + unseen),
+        float[](noise, square.x, product.x, product.y, product.z),
+        float[](noise, product.x, square.y, product.w, other.x),
+        float[](noise, product.y, product.w, square.z, other.y),
+        float[](noise + unseen, product.z, other.x, other.y, square.w));
+}
+
 // Moves weight between pairs where that lessens the error. `growth` is half the derivative of the blend's mean squared error by each
 // weight.
 void exchange(inout float w[5], inout float growth[5], float missed[5][5], bool usable[5]) {
@@ -84,16 +99,8 @@ void main() {
     // better than they are. A filter that could not in-paint the pixel is of no use either.
     bool enough = c.w >= ENOUGH;
     bool usable[5] = bool[](enough, a.w > 0.0, b.w > 0.0, n.w > 0.0, c.w >= ENOUGH_FOR_SVGF && d.w > 0.0);
-    // Mean products of the candidates' errors. An independent copy of the pixel misses it by the noise of both, and shares
-    // the pixel's own noise with every filter's error.
     float told = 0.5 * other.z, noise = max(min(told, min(min(square.x, square.y), min(square.z, square.w))), LEAST_NOISE * told);
-    float optimism = optimism_of(noise);
-    float missed[5][5] = float[][](
-        float[](2.0 * noise, noise, noise, noise, noise),
-        float[](noise, square.x, product.x, product.y, product.z + optimism),
-        float[](noise, product.x, square.y, product.w, other.x + optimism),
-        float[](noise, product.y, product.w, square.z, other.y + optimism),
-        float[](noise, product.z + optimism, other.x + optimism, other.y + optimism, square.w + 2.0 * optimism));
+    float missed[5][5] = mean_products(square, product, other, noise);
     float w[5] = float[](0.0, 0.0, 0.0, 0.0, 0.0), least = MAX_ERROR;
     int best = 1;
     [[unroll]] for (int k = 0; k < 5; k++) {
@@ -127,7 +134,7 @@ void main() {
     vec3 all = base + off;
     float of_mean = own_variance(at, c.w), bright = luminance(all), most = OF_ONE_SAMPLE * max(luminance(d.rgb), 0.0);
     bool dominated = usable[4] && c.w >= ENOUGH_TO_TELL_ONE && of_mean >= 0.0 && sqrt(of_mean) > DOMINATED * abs(luminance(c.rgb));
-    if (dominated && bright > most && luminance(c.rgb) > bright) all *= most / bright;
+    if (dominated && bright > most && luminance(c.rgb) >= bright) all *= most / bright;
     bool doubted = of_mean >= 0.0 && c.w >= ENOUGH_TO_DOUBT && !blurred(at);
     blend[i] = any_usable ? vec4(all, doubted ? max(of_mean, texelFetch(estimate, at).w) : of_mean) : vec4(vec3(0.0), UNFILTERED);
 }

@@ -30,9 +30,9 @@ vec4 leverages_of(vec4 found, vec2 shares) {
 const float NOISE = 4.0;
 
 // The optimism of an error estimate is the covariance of a pixel's noise with its filtered value (Efron 2004). Leverages tell it of linear
-// filters. svgf's weights follow a pixel's own noise as well, so that what is dark by chance is met by a result that is dark. The more
-// noise there is beside light, the more: by this share of it where light is drowned. Without it svgf was taken for walls of rooms that few
-// bright paths light, and made them as dark as most of their pixels.
+// filters. svgf's weights follow a pixel's own noise as well, so that pixels which are dark by chance get a result that is dark. That part
+// grows with what noise has of all that is seen, up to this share of the noise where it drowns light. Without it svgf was taken for
+// walls of rooms that few bright paths light, and made them as dark as most of their pixels.
 const float OPTIMISM = 0.1;
 float optimism_of(float noise) {
     float share = min(NOISE * noise, 1.0); // of the noise in what errors are divided by

@@ -26,7 +26,7 @@ chmod +x \"$target/release/tallow\"
 ";
 
 /// Stands for cargo where it packages, and checks the package, which fails where there is a glslc. What the package is built of is that of
-/// the repository, but for what a file `damage` is added to.
+/// the repository, unless a file `damage` names a file to spoil.
 const PACKAGES: &str = "#!/bin/sh
 makes() {
     printf '%s\\n' \"include_bytes!($1/spirv/path.spv)\" >\"$1/shaders.rs\"

@@ -137,7 +137,8 @@ fn auto_leaves_no_specks_where_samples_are_dark_by_chance() {
 }
 
 /// Light of 1 on a wall, which one sample in 64 brings, and another a little: of 16 samples six pixels in ten have met nothing. Were svgf
-/// trusted by left-out pixels alone, .033 of the noise's error would stay, and 28 specks were what little one sample has brought cut.
+/// trusted by left-out pixels alone, .033 of the noise's error would stay. Were the light of single samples cut in dark pixels too, there
+/// would be 28 specks.
 #[test]
 fn auto_keeps_the_light_that_few_samples_bring() {
     const SPP: u32 = 16;

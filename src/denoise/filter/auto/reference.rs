@@ -230,14 +230,15 @@ fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
 fn matrix([squares, products, others]: [Vec4; 3]) -> Errors {
     let told = 0.5 * others.z;
     let noise = told.min(squares.min_element()).max(LEAST_NOISE * told);
-    let optimism = OPTIMISM * (NOISE * noise).min(1.0).powi(2) * noise;
-    let (products, others) = (products + optimism * Vec4::Z, others + optimism * (Vec4::X + Vec4::Y));
+    let unseen = OPTIMISM * (NOISE * noise).min(1.0).powi(2) * noise;
+    let (squares, products) = (squares + 2.0 * unseen * Vec4::W, products + unseen * Vec4::Z);
+    let others = others + unseen * (Vec4::X + Vec4::Y);
     [
-        [2.0 * noise, noise, noise, noise, noise],
+        [2.0 * noise, noise, noise, noise, noise + unseen],
         [noise, squares.x, products.x, products.y, products.z],
         [noise, products.x, squares.y, products.w, others.x],
         [noise, products.y, products.w, squares.z, others.y],
-        [noise, products.z, others.x, others.y, squares.w + 2.0 * optimism],
+        [noise + unseen, products.z, others.x, others.y, squares.w],
     ]
 }
 
@@ -267,7 +268,7 @@ fn less_of_one_sample(p: &Packed, variance: f32, blend: Vec4, svgf: Vec3) -> Vec
     let (bright, most) = (luminance(blend.xyz()), OF_ONE_SAMPLE * luminance(svgf).max(0.0));
     let own = luminance(p.colour);
     let dominated = variance.sqrt() > DOMINATED * own.abs();
-    if dominated && bright > most && own > bright { (blend.xyz() * (most / bright)).extend(blend.w) } else { blend }
+    if dominated && bright > most && own >= bright { (blend.xyz() * (most / bright)).extend(blend.w) } else { blend }
 }
 
 /// Weights of at least 0, together 1, whose blend has the least mean square; those that are not usable get none.
