@@ -418,9 +418,10 @@ fn auto_trusts_variances_of_two_samples() {
         (2.0, 0.0, 1.0, 0.0),
         // A pixel that stands alone seems not to vary: of one sample that is no proof.
         (1.0, 0.0, 1.0, 0.5),
-        // Squares stay finite: of deviations, and of values 1e23 times the luminance below which errors are absolute.
-        (4.0, f32::MAX, 1.0, 0.0),
-        (65536.0, f32::MAX, 1.0, 0.0),
+        // Squares stay finite: of deviations, and of values 1e23 times the luminance below which errors are absolute. Where noise drowns
+        // the light, svgf is not trusted by left-out pixels alone.
+        (4.0, f32::MAX, 1.0, 0.5),
+        (65536.0, f32::MAX, 1.0, 0.5),
         (4.0, 0.0, 4e20, 0.0),
     ] {
         let mut input = line(&[0.0, value]);
