@@ -1,4 +1,5 @@
 //! From the `[camera]` table and the film's shape to the camera that kernels read.
+use super::value::some_list;
 use crate::error::Checked;
 use crate::layout;
 use crate::scene::MAX_COORDINATE;
@@ -26,13 +27,17 @@ pub enum FovAxis {
 #[serde(deny_unknown_fields, default)]
 pub struct Camera {
     /// Point that rays start from.
+    #[serde(deserialize_with = "some_list")]
     pub position: Option<[f64; 3]>,
     /// A point in the middle of the image.
+    #[serde(deserialize_with = "some_list")]
     pub target: Option<[f64; 3]>,
     /// A direction that is up in the image; default +y.
+    #[serde(deserialize_with = "some_list")]
     pub up: Option<[f64; 3]>,
     /// Row-major 4 x 4; the camera looks along -z, +x is right, +y is up. Scales and shear are
     /// dropped, a mirror is kept: the view keeps its axis, and up its plane with it.
+    #[serde(deserialize_with = "some_list")]
     pub world_from_camera: Option<[f64; 16]>,
     /// Degrees along `fov_axis`, from 1e-6 and below 180; default 40.
     pub fov: Option<f64>,

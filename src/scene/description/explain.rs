@@ -179,6 +179,36 @@ mod tests {
     }
 
     #[test]
+    fn numbers_that_are_too_many_are_refused() {
+        let three = "[[light]]\ntype = 'spot'\n";
+        let picture = "[[material]]\ncolor_texture = { file = 'a.png',";
+        for (before, key, count, after) in [
+            ("[camera]\n", "position", 3, ""),
+            ("[camera]\n", "target", 3, ""),
+            ("[camera]\n", "up", 3, ""),
+            ("[camera]\n", "world_from_camera", 16, ""),
+            ("[environment]\n", "world_from_environment", 9, ""),
+            ("[[mesh]]\ntransform = {", "translate", 3, "}"),
+            ("[[mesh]]\n", "transform", 16, ""),
+            (three, "position", 3, ""),
+            (three, "direction", 3, ""),
+            (three, "target", 3, ""),
+            (picture, "offset", 2, "}"),
+            (picture, "scale", 2, "}"),
+        ] {
+            let line = |count: usize| {
+                let identity = (0..count).map(|i| if i % 5 == 0 { "1" } else { "0" });
+                format!("{before}{key} = [{}]{after}", identity.collect::<Vec<_>>().join(", "))
+            };
+            for wrong in [count - 1, count + 1] {
+                says(&line(wrong), &format!("{key} takes {count} numbers"));
+                says(&line(wrong), &format!(", not {wrong} values"));
+            }
+            assert!(parse(Path::new("s.toml"), &line(count)).is_ok(), "control: {key}");
+        }
+    }
+
+    #[test]
     fn headers_have_as_many_brackets_as_there_may_be_tables() {
         says("[film]\n[mesh]\nshape = 'cube'", "line 2: there may be several of mesh: write [[mesh]]");
         says("[[film]]\nwidth = 8", "line 1: there is only one film: write [film]");

@@ -1,6 +1,6 @@
 //! The `[[light]]` tables.
 use super::keys::told;
-use super::value::Rgb;
+use super::value::{Rgb, some_list};
 use crate::error::Checked;
 use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, NONE};
 use crate::scene::{MAX_COORDINATE, MAX_RADIANCE};
@@ -30,10 +30,13 @@ pub struct LightTable {
     /// Name for what moves it.
     pub name: Option<String>,
     /// Position of a point or spot light.
+    #[serde(default, deserialize_with = "some_list")]
     pub position: Option<[f32; 3]>,
     /// Direction in which the light of a spot or directional light travels, of any length.
+    #[serde(default, deserialize_with = "some_list")]
     pub direction: Option<[f32; 3]>,
     /// A point on the axis of a spot light, in place of `direction`.
+    #[serde(default, deserialize_with = "some_list")]
     pub target: Option<[f32; 3]>,
     /// Radiant intensity of a point or spot light (of a spot on its axis), W/sr, from 0 to 1e30.
     pub intensity: Option<Rgb>,

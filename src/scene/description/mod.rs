@@ -29,6 +29,7 @@ pub use shape::Shape;
 pub use texture::{TextureFilter, TextureTable, Wrap};
 pub(in crate::scene) use value::affine;
 pub(super) use value::rotation;
+use value::some_list;
 pub use value::{Rgb, Transform};
 
 use crate::error::{Error, Result};
@@ -86,6 +87,7 @@ pub struct EnvironmentTable {
     /// Rotation about +y in degrees.
     pub rotation: f64,
     /// Rotation as nine row-major numbers, in place of `rotation`.
+    #[serde(deserialize_with = "some_list")]
     pub world_from_environment: Option<[f64; 9]>,
 }
 

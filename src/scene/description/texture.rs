@@ -1,4 +1,5 @@
 //! Textures as materials name them: a file, or a picture in memory, and how it lies on a surface.
+use super::value::{list, numbers, some_list};
 use crate::error::Checked;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor, value};
@@ -96,10 +97,11 @@ struct Table {
     filter: TextureFilter,
     #[serde(default)]
     uv: u32,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "list")]
     offset: [f32; 2],
     #[serde(default)]
     rotate: f32,
+    #[serde(default, deserialize_with = "some_list")]
     scale: Option<[f32; 2]>,
 }
 
@@ -140,7 +142,7 @@ impl<'de> Deserialize<'de> for Wraps {
                 Wrap::deserialize(value::StrDeserializer::new(name)).map(|wrap| Wraps([wrap; 2]))
             }
             fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Wraps, A::Error> {
-                Deserialize::deserialize(value::SeqAccessDeserializer::new(seq)).map(Wraps)
+                numbers(seq, |e| e, &self).map(Wraps)
             }
         }
         deserializer.deserialize_any(Either)
@@ -181,6 +183,8 @@ mod tests {
         assert!(read("5").unwrap_err().contains("a path or a table with file"));
         assert!(read("{ wrap = 'clamp' }").unwrap_err().contains("missing field `file`"));
         assert!(read("{ file = 'a', wrap = 'clam' }").unwrap_err().contains("unknown variant `clam`"));
+        let many = read("{ file = 'a', wrap = ['clamp', 'mirror', 'clamp'] }").unwrap_err();
+        assert!(many.contains("invalid length 3, expected repeat, mirror, clamp, or two of them"), "{many}");
         assert!(read("{ file = 'a', rotation = 1 }").unwrap_err().contains("unknown field `rotation`"));
         let far = TextureTable { rotate: f32::NAN, ..TextureTable::default() };
         assert!(far.check().unwrap_err().contains("rotate"));

@@ -3,6 +3,7 @@ use crate::error::Checked;
 use glam::{DAffine3, DMat4, DQuat, DVec3, EulerRot};
 use serde::de::{Deserialize, Deserializer, Error, Expected, MapAccess, SeqAccess, Unexpected, Visitor, value};
 use std::fmt;
+use std::marker::PhantomData;
 
 /// Three channels, written as `[r, g, b]` or as one number for all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,27 +30,61 @@ fn one_or_three<'de, D: Deserializer<'de>>(deserializer: D, expected: &'static s
             Ok([v as f32; 3])
         }
         fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<[f32; 3], A::Error> {
-            numbers(seq, &self).map(|v| v.map(|v| v as f32))
+            numbers(seq, other(&self), &self)
         }
     }
     deserializer.deserialize_any(OneOrThree(expected))
 }
 
-/// Numbers in order: a fixed count, or an error that says what is expected and how many were given.
-fn numbers<'de, const N: usize, A: SeqAccess<'de>>(mut seq: A, expected: &dyn Expected) -> Result<[f64; N], A::Error> {
+/// Values in order: a fixed count, or an error that says what is expected and how many were given. Serde's arrays leave those unread that
+/// are too many. `wrong` is the error where one of them is of another type.
+pub fn numbers<'de, const N: usize, T: Deserialize<'de>, A: SeqAccess<'de>>(
+    mut seq: A,
+    wrong: impl Fn(A::Error) -> A::Error,
+    expected: &dyn Expected,
+) -> Result<[T; N], A::Error> {
     let mut found = Vec::with_capacity(N);
-    let other = |_| A::Error::invalid_type(Unexpected::Other("a list of something else"), expected);
-    while let Some(v) = seq.next_element().map_err(other)? {
+    while let Some(v) = seq.next_element().map_err(&wrong)? {
         found.push(v);
     }
     let count = found.len();
     found.try_into().map_err(|_| A::Error::invalid_length(count, expected))
 }
 
+/// An error of a list in which something other than numbers stands.
+fn other<E: Error>(expected: &dyn Expected) -> impl Fn(E) -> E {
+    move |_| E::invalid_type(Unexpected::Other("a list of something else"), expected)
+}
+
+/// A list of as many values as there are places, for `deserialize_with`.
+pub fn list<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<[T; N], D::Error> {
+    struct List<T, const N: usize>(PhantomData<T>);
+    impl<'de, T: Deserialize<'de>, const N: usize> Visitor<'de> for List<T, N> {
+        type Value = [T; N];
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            write!(f, "an array of length {N}")
+        }
+        fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<[T; N], A::Error> {
+            numbers(seq, |e| e, &self)
+        }
+    }
+    deserializer.deserialize_seq(List(PhantomData))
+}
+
+/// The same of a key that may be absent.
+pub fn some_list<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<Option<[T; N]>, D::Error> {
+    list(deserializer).map(Some)
+}
+
 /// `{ translate, rotate, scale }`: scaled first, then rotated, then moved.
 #[derive(Clone, Debug, Default, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Steps {
+    #[serde(deserialize_with = "list")]
     translate: [f64; 3],
     rotate: Rotation,
     scale: Option<Scale>,
@@ -181,7 +216,7 @@ impl<'de> Deserialize<'de> for Transform {
                 f.write_str(TRANSFORM)
             }
             fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Transform, A::Error> {
-                Transform::try_from(numbers::<16, A>(seq, &self)?).map_err(A::Error::custom)
+                Transform::try_from(numbers::<16, f64, A>(seq, other(&self), &self)?).map_err(A::Error::custom)
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Transform, A::Error> {
                 let steps = Steps::deserialize(value::MapAccessDeserializer::new(map))?;
