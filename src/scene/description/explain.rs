@@ -5,7 +5,7 @@ pub(super) fn explain(text: &str, at: usize, message: &str) -> String {
     wrong_table(text, at, message)
         .or_else(|| wrong_type(text, at, message))
         .or_else(|| unknown(message))
-        .or_else(|| syntax(message))
+        .or_else(|| syntax(text, at, message))
         .unwrap_or_else(|| message.replace('\n', " "))
 }
 
@@ -16,9 +16,11 @@ fn unknown(message: &str) -> Option<String> {
         m if m.starts_with("unknown variant") => "value",
         _ => return None,
     };
-    let quoted: Vec<_> = message.split('`').skip(1).step_by(2).collect();
-    let (unknown, known) = quoted.split_first().unwrap_or((&"", &[]));
-    let hint = hint(unknown, known).map_or_else(|| ".".to_owned(), |hint| format!(": {hint}"));
+    // The word itself may have such quotes.
+    let (unknown, known) = message.rsplit_once("`, expected").unwrap_or_else(|| (message.trim_end_matches('`'), ""));
+    let unknown = unknown.split_once('`').map_or("", |(_, word)| word);
+    let known: Vec<_> = known.split('`').skip(1).step_by(2).collect();
+    let hint = hint(unknown, &known).map_or_else(|| ".".to_owned(), |hint| format!(": {hint}"));
     let known = if known.is_empty() { String::new() } else { format!(" Known: {}", known.join(", ")) };
     Some(format!("unknown {kind} \"{unknown}\"{hint}{known}"))
 }
@@ -26,11 +28,17 @@ fn unknown(message: &str) -> Option<String> {
 /// A header with one pair of brackets in place of two, or the other way.
 fn wrong_table(text: &str, at: usize, message: &str) -> Option<String> {
     let (name, is_double) = header(text, at).filter(|_| message.starts_with("invalid type"))?;
+    // What stands at the top is a table whatever the message says: a list may fill one, in the order of its keys.
+    let is_table = !name.contains('.') || message.contains("a table");
     match (is_double, LISTS.contains(&name)) {
-        (true, false) => Some(format!("there is only one {name}: write [{name}]")),
-        (false, true) => Some(format!("there may be several of {name}: write [[{name}]]")),
+        (true, false) if is_table => Some(format!("there is only one {name}: write [{name}]")),
+        (false, true) => Some(of_several(name)),
         _ => None,
     }
+}
+
+fn of_several(name: &str) -> String {
+    format!("there may be several of {name}: write [[{name}]]")
 }
 
 /// Tables of which there may be several.
@@ -50,6 +58,12 @@ fn wrong_type(text: &str, at: usize, message: &str) -> Option<String> {
     let starts = ["invalid type: ", "invalid value: ", "invalid length "];
     let rest = starts.iter().find_map(|start| message.strip_prefix(start))?;
     let (found, expected) = rest.rsplit_once(", expected ")?;
+    let of_header = || header(text, at)?.0.rsplit('.').next().map(str::to_owned);
+    // A header comes first: what stands above it is the value of another key.
+    let key = of_header().or_else(|| key_before(text, at));
+    if let Some(name) = key.as_deref().filter(|name| expected == "a sequence" && LISTS.contains(name)) {
+        return Some(of_several(name));
+    }
     let expected = match expected {
         "f32" | "f64" => "a number, such as 0.5".to_owned(),
         "u32" => "a whole number from 0 to 4294967295".to_owned(),
@@ -72,37 +86,77 @@ fn wrong_type(text: &str, at: usize, message: &str) -> Option<String> {
         // As in "integer `-1`".
         value => value.split('`').nth(1).unwrap_or(value),
     };
-    let of_header = || header(text, at)?.0.rsplit('.').next();
-    Some(match key_before(text, at).or_else(of_header) {
+    Some(match key {
         Some(key) => format!("{key} takes {expected}, not {found}"),
         None => format!("{expected} is expected here, not {found}"),
     })
 }
 
 /// The key of the value that begins at byte `at`, or of the list of numbers in which it stands.
-fn key_before(text: &str, at: usize) -> Option<&str> {
-    let is_of_list = |c: char| c.is_whitespace() || c.is_ascii_digit() || "[,.+-".contains(c);
-    let before = text.get(..at)?.trim_end_matches(is_of_list).strip_suffix('=')?.trim_end();
+fn key_before(text: &str, at: usize) -> Option<String> {
+    // Numbers may be 1e5, 0xff and inf.
+    let is_of_list = |c: char| c.is_whitespace() || c.is_alphanumeric() || "[,.+-_\"'".contains(c);
+    let before = text.get(..at)?.split('\n').map(code).collect::<Vec<_>>().join("\n");
+    let before = before.trim_end_matches(is_of_list).strip_suffix('=')?.trim_end();
     let is_of_key = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
-    Some(before.rsplit(|c| !is_of_key(c)).next()?).filter(|key| !key.is_empty())
+    Some(before.rsplit(|c| !is_of_key(c)).next()?.to_owned()).filter(|key| !key.is_empty())
+}
+
+/// A line without its comment.
+fn code(line: &str) -> &str {
+    let mut quote = None;
+    for (i, c) in line.char_indices() {
+        match quote {
+            None if c == '#' => return &line[..i],
+            None => quote = ['"', '\''].into_iter().find(|&q| q == c),
+            Some(q) => quote = quote.filter(|_| q != c),
+        }
+    }
+    line
 }
 
 /// What the parser says of words without quotes and of lists without commas leads astray.
-fn syntax(message: &str) -> Option<String> {
+fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
     let field =
         message.strip_prefix("missing field ").map(|field| format!("the key {} is missing", field.replace('`', "\"")));
     let said = match message.lines().next()? {
+        m if m.starts_with("string values must be quoted") && is_end(text, at) => return Some(no_value(text, at)),
         m if m.starts_with("string values must be quoted") => {
             "texts stand in quotes, and the values of a list have commas between them"
         }
         m if m.starts_with("invalid boolean") => "texts stand in quotes, and true and false are written so",
         m if m.starts_with("wanted exactly 1 element") || m.starts_with("wanted string") => {
-            "a text in quotes is expected here"
+            return Some(word(text, at));
         }
         m if m.contains("untagged enum Numbers") => "a key takes a number or a list of numbers",
         _ => return field,
     };
     Some(said.to_owned())
+}
+
+/// Whether nothing stands on the line behind byte `at`.
+fn is_end(text: &str, at: usize) -> bool {
+    text.get(at..).is_some_and(|rest| code(rest.split('\n').next().unwrap_or_default()).trim().is_empty())
+}
+
+fn no_value(text: &str, at: usize) -> String {
+    match key_before(text, at) {
+        Some(key) => format!("the value of {key} is missing"),
+        None => "a value is missing here".to_owned(),
+    }
+}
+
+/// What a key takes that knows a few words.
+fn word(text: &str, at: usize) -> String {
+    let Some(key) = key_before(text, at) else { return "a text in quotes is expected here".to_owned() };
+    let table = text[..at].lines().rev().map(str::trim_start).find(|line| line.starts_with('[')).unwrap_or_default();
+    let example = match key.as_str() {
+        "shape" => ", such as \"cube\"",
+        "type" if table.contains("light") => ", such as \"point\"",
+        "type" => ", such as \"diffuse\"",
+        _ => "",
+    };
+    format!("{key} takes a text in quotes{example}")
 }
 
 /// What a word stands for that is not among the known ones: what other renderers call so, or the known one most like it.
@@ -169,13 +223,38 @@ mod tests {
         says("[render]\nspp = -1", "spp takes a whole number from 0 to 4294967295, not -1");
         says("[[mesh]]\nflat = 1", "flat takes true or false, not 1");
         says("[[mesh]]\nfile = ['a.obj']", "file takes a text in quotes, such as \"name\", not a list");
-        says("[[mesh]]\nshape = { type = 'cube', size = 2 }", "a text in quotes is expected here");
+        for shape in ["{ type = 'cube', size = 2 }", "3", "['cube']"] {
+            says(&format!("[[mesh]]\nshape = {shape}"), "line 2: shape takes a text in quotes, such as \"cube\"");
+        }
+        says("[[light]]\ntype = 3", "line 2: type takes a text in quotes, such as \"point\"");
+        says("[[material]]\ntype = 3", "line 2: type takes a text in quotes, such as \"diffuse\"");
         says("[[material]]\ncolor = '#ff0000'", "color takes a number or [r, g, b], not \"#ff0000\"");
         says("[[material]]\ncolor = [1, 0, 0, 1]", "line 2: color takes a number or [r, g, b], not 4 values");
         says("[[mesh]]\ntransform = { scale = [1, 2, 3, 4] }", "scale takes a number or [x, y, z], not 4 values");
         says("environment = 'a.hdr'", "environment takes a table, such as { key = value }, not \"a.hdr\"");
         says("[[animation]]\nkeys = [{ time = 0, fov = 'a' }]", "a key takes a number or a list of numbers");
         says("[[instance]]\n", "the key \"mesh\" is missing");
+        for table in ["3", "{ shape = 'cube' }", "'a.obj'"] {
+            says(&format!("mesh = {table}"), "line 1: there may be several of mesh: write [[mesh]]");
+        }
+        says("[film]\nfilter = \"te`nt\"", "unknown value \"te`nt\": did you mean \"tent\"? Known: box, ");
+        for end in ["", " ", "\n", " # degrees\nposition = [1, 2, 3]"] {
+            says(&format!("[camera]\nfov ={end}"), "line 2: the value of fov is missing");
+        }
+    }
+
+    #[test]
+    fn keys_are_those_of_the_value_and_of_no_other_line() {
+        let number = "takes a number, such as 0.5, not \"a\"";
+        for list in
+            ["[1e5, 'a', 3]", "[0xff, 1_0, 'a']", "[-inf, 'a', 3]", "[\n0, # y = 1\n'a', 2]", "[ # it's = 3\n'a']"]
+        {
+            says(&format!("[camera]\nposition = {list}"), &format!("position {number}"));
+        }
+        for above in ["roughness = 0.5", "roughness = 0xff\n\n", "name = '1' # y = 2", "name = '# = 1'"] {
+            let header = format!("[[material]]\n{above}\n[material.color]\nr = 1");
+            says(&header, ": color takes a number or [r, g, b], not a table");
+        }
     }
 
     #[test]
@@ -220,6 +299,16 @@ mod tests {
         says("[[animation]]\n[animation.keys]\ntime = 0", "line 2: there may be several of animation.keys: write [[");
         says("[[animation]]\n[[animation.keys]]\ntime = 'a'", "takes a number, such as 0.5, not \"a\"");
         says("[[material]]\n[material.color]\nr = 1", "color takes a number or [r, g, b], not a table");
+        says(
+            "[[mesh]]\n[[mesh.file]]\nname = 'a'",
+            "line 2: file takes a text in quotes, such as \"name\", not a list",
+        );
+        says(
+            "[environment]\n[[environment.radiance]]\nr = 1",
+            "line 2: radiance takes a number or [r, g, b], not a list",
+        );
+        says("[[allocate]]\npolicy = 'both'", "there is only one allocate: write [allocate]");
+        says("[[environment]]\n", "there is only one environment: write [environment]");
     }
 
     #[test]
