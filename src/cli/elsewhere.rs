@@ -1,5 +1,7 @@
 //! What options and commands of other programs are called here: the known words that are most like theirs by the letters lead astray.
 use super::quoted;
+use crate::image;
+use crate::scene::SceneFile;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error};
 use std::path::Path;
@@ -23,13 +25,28 @@ fn of_command(word: &str) -> Option<String> {
         "convert" | "tonemap" => "filter --filter none",
         "diff" | "flip" => "compare",
         "animate" => "sequence",
-        "bench" | "benchmark" => "profile, and of methods cost",
-        "info" => "devices, and of scenes explain",
+        "bench" | "benchmark" => "profile (tallow cost for filters and policies)",
+        "info" => "devices, or tallow explain for a scene",
         "version" => "--version",
-        file if Path::new(file).is_file() => return Some(format!("to render it, tallow render {}", quoted(file))),
+        file if is_scene(Path::new(file)) => return Some(format!("to render it, tallow render {}", quoted(file))),
         _ => return None,
     };
     Some(format!("here that is tallow {here}"))
+}
+
+/// A file that `tallow render` would read.
+fn is_scene(path: &Path) -> bool {
+    path.is_file() && SceneFile::is_named(path)
+}
+
+/// Whether the command writes images of such a name.
+fn writes(command: &Command, name: &str) -> bool {
+    image::is_written(Path::new(name))
+        && match command.get_name() {
+            "render" | "filter" => true,
+            "sequence" => name.contains('#'),
+            _ => false,
+        }
 }
 
 /// Only such as the command has.
@@ -43,7 +60,7 @@ fn of_option(word: &str, command: &Command) -> Option<String> {
         "--threshold" | "--tolerance" | "--max-error" => &["max-mse", "max-relmse", "max-flip", "min-psnr", "min-ssim"],
         "--time-limit" | "--timeout" | "--budget" => &["time"],
         "--start" | "--end" | "--start-frame" | "--end-frame" => &["frames"],
-        file if !file.starts_with('-') && has("output") && Path::new(file).extension().is_some() => {
+        file if !file.starts_with('-') && writes(command, file) => {
             return Some(format!("what is written is named by -o {}", quoted(file)));
         }
         _ => return None,

@@ -129,6 +129,14 @@ fn run(command: Command) -> Result<Exit> {
     }
 }
 
+/// What the standard library says of numbers, and what is said here.
+const PLAINER: [(&str, &str); 4] = [
+    ("invalid digit found in string", "expected a whole number"),
+    ("cannot parse integer from empty string", "expected a whole number"),
+    ("number too large to fit in target type", "the number is too large"),
+    ("number too small to fit in target type", "the number is too small"),
+];
+
 /// Prints clap's help or version, or turns its error message into one line with the problem and the tip.
 fn usage(e: &clap::Error, words: &[OsString]) -> Result<Exit> {
     let text = e.render().to_string();
@@ -153,8 +161,7 @@ fn usage(e: &clap::Error, words: &[OsString]) -> Result<Exit> {
     };
     let parts = text.split("\n\n").map(one_line).filter(tells);
     let message = parts.chain(tip.iter().map(|tip| format!("tip: {tip}"))).collect::<Vec<_>>().join("; ");
-    // As the standard library says of a whole number.
-    let message = message.replace("invalid digit found in string", "expected a whole number");
+    let message = PLAINER.iter().fold(message, |message, (of_rust, here)| message.replace(of_rust, here));
     let message = message.trim_start_matches("error: ");
     let subcommand = subcommand.map_or_else(String::new, |found| format!("{} ", found.get_name()));
     Err(Error::Usage(format!("{message} (see tallow {subcommand}--help)")))

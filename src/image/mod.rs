@@ -58,6 +58,12 @@ fn format_of(path: &Path) -> Result<Format> {
     }
 }
 
+/// Whether [`write()`] knows the ending of such a name.
+#[cfg(feature = "cli")]
+pub(crate) fn is_written(path: &Path) -> bool {
+    format_of(path).is_ok()
+}
+
 /// Whether a file of this name can hold more layers than the colour.
 pub fn has_layers(path: &Path) -> bool {
     matches!(format_of(path), Ok(Format::Exr))

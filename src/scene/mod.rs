@@ -216,6 +216,13 @@ impl<'a> SceneFile<'a> {
         Self::open_clip(path, None)
     }
 
+    /// Whether a file of such a name is read as a scene.
+    #[cfg(feature = "cli")]
+    pub(crate) fn is_named(path: &Path) -> bool {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        extension == "toml" || extension == "obj" || Format::of(path) != Format::Obj
+    }
+
     /// As [`SceneFile::open`], but of a glTF file only the animation `clip` is played, if one is named.
     ///
     /// # Errors

@@ -49,8 +49,23 @@ fn usage_errors_are_one_line_and_exit_2() {
         ("compare a.exr b.exr --threshold 1", "tip: here that is --max-mse, --max-relmse, --max-flip, "),
         ("denoise a.exr", "'denoise'; tip: here that is tallow filter (see"),
         ("render s.toml --spp 1e3", "expected a whole number (see"),
+        ("render s.toml --spp=", "expected a whole number (see"),
+        ("render s.toml --spp 99999999999999999999", "the number is too large (see"),
+        ("filter a.exr b.png", "'b.png' found; tip: what is written is named by -o b.png (see"),
+        ("sequence s.toml f.#.png", "'f.#.png' found; tip: what is written is named by -o f.#.png (see"),
+        ("bench s.toml", "tip: here that is tallow profile (tallow cost for filters and policies) (see"),
+        ("info", "tip: here that is tallow devices, or tallow explain for a scene (see"),
     ] {
         complains(&run(&words.split(' ').collect::<Vec<_>>()), 2, &[tip]);
+    }
+    // Names of neither images nor scenes are answered by neither tip.
+    std::fs::write(folder.path().join("a.txt"), "").unwrap();
+    for words in
+        ["render s.toml b.toml", "render s.toml a.tif", "sequence s.toml a.png", "explain s.toml a.png", "a.txt"]
+    {
+        let output = run(&words.split(' ').collect::<Vec<_>>());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && !said.contains("-o ") && !said.contains("to render it"), "{said}");
     }
     complains(&run(&["my s.toml"]), 2, &["tip: to render it, tallow render 'my s.toml' (see tallow --help)"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--min-psnr", "nan"]), 2, &["finite"]);
