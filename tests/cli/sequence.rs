@@ -267,11 +267,11 @@ fn without_frames_all_of_the_animation_is_rendered() {
     refused("nothing moves; give --frames");
     let one_key = format!("{still}[[animation]]\ncamera = true\nkeys = [{{ time = 0, position = [0, 0, 9] }}]\n");
     fs::write(folder.path().join("s.toml"), one_key).unwrap();
-    refused("what moves has one pose, that of time 0; give --frames 0..1");
+    refused("what moves has no key after time 0; give --frames 0..1");
     let output = run(&folder, "-o one.#.png --frames 0..1");
     let line = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        output.status.success() && line.contains("warning: all frames are alike: what moves has one pose"),
+        output.status.success() && line.contains("warning: all frames are alike: what moves has no key after time 0"),
         "{line}"
     );
 }

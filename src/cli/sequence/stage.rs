@@ -68,10 +68,12 @@ impl<'a> Stage<'a> {
             animation.movers.push(Arc::new(Turntable::new(&scene, settings.size(), degrees, span)));
         }
         warnings.add(scene.warnings.clone());
-        let still = match animation.end() {
-            _ if animation.is_empty() => Some("nothing moves in the scene (add [[animation]] tables, or --turntable)"),
-            0.0 => Some("what moves has one pose, that of time 0 (give later keys, another --clip, or --turntable)"),
-            _ => None,
+        let still = if animation.is_empty() {
+            Some("nothing moves in the scene (add [[animation]] tables, or --turntable)")
+        } else if animation.end() == 0.0 {
+            Some("what moves has no key after time 0 (give later keys, another --clip, or --turntable)")
+        } else {
+            None
         };
         warnings.add(still.map(|why| format!("all frames are alike: {why}")));
         let gpu = args.render.common.open(args.render.tracing)?;
@@ -305,7 +307,7 @@ fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
     if animation.end() == 0.0 {
         let how = match animation.is_empty() {
             true => "nothing moves; give --frames 0..96",
-            false => "what moves has one pose, that of time 0; give --frames 0..1 for it, or another --clip",
+            false => "what moves has no key after time 0; give --frames 0..1 for its pose, or another --clip",
         };
         return Err(Error::Usage(format!("how many frames there are is not known: {how}")));
     }
