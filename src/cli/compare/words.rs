@@ -17,15 +17,14 @@ const ROWS: usize = 8;
 /// A share in percent, with two significant digits.
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
-    if percent.abs() >= 1e9 {
-        return format!("{percent:.1e} %");
+    // Rounded before its digits are counted: 9.96 becomes 10.
+    let rounded = format!("{percent:.1e}");
+    match rounded.split_once('e').map_or(Ok(0), |(_, power)| power.parse::<i32>()) {
+        _ if percent == 0.0 => "0 %".to_owned(),
+        Ok(9..) => format!("{rounded} %"),
+        Ok(2..) => format!("{:.0} %", rounded.parse().unwrap_or(percent)),
+        power => format!("{percent:.*} %", (1 - power.unwrap_or(0)).clamp(0, 4) as usize),
     }
-    if percent.abs() >= 100.0 {
-        let unit = 10f64.powf(percent.abs().log10().floor() - 1.0);
-        return format!("{:.0} %", (percent / unit).round() * unit);
-    }
-    let digits = (1.0 - percent.abs().max(1e-4).log10().floor()).clamp(0.0, 4.0) as usize;
-    format!("{percent:.digits$} %")
 }
 
 /// What was tested of images that were filtered, a sentence for each.
@@ -124,6 +123,9 @@ fn rounded_up(samples: f64) -> String {
 }
 
 fn two_digits_up(number: f64) -> f64 {
+    if number <= 0.0 {
+        return 0.0;
+    }
     let unit = 10f64.powf(number.log10().floor() - 1.0);
     (number / unit).ceil() * unit
 }
@@ -168,7 +170,10 @@ mod tests {
     #[test]
     fn numbers_have_two_digits_that_mean_something() {
         let shown = [1.234, -456.7, 0.3456, 0.0123, -0.00256, 1e-5, 0.0].map(percent);
-        assert_eq!(shown, ["120 %", "-46000 %", "35 %", "1.2 %", "-0.26 %", "0.0010 %", "0.0000 %"]);
+        assert_eq!(shown, ["120 %", "-46000 %", "35 %", "1.2 %", "-0.26 %", "0.0010 %", "0 %"]);
+        let shown = [0.0996, 0.00996, -0.0996, 0.0994, 0.996, 9.96, 1e7, 9.96e6, f64::INFINITY].map(percent);
+        assert_eq!(shown, ["10 %", "1.0 %", "-10 %", "9.9 %", "100 %", "1000 %", "1.0e9 %", "1.0e9 %", "inf %"]);
+        assert_eq!([0.0, -1.0].map(two_digits_up), [0.0; 2]);
         assert_eq!([1.01, 5.31, 9.99, 123.0].map(rounded_up), ["1.1", "5.4", "10", "130"]);
     }
 }
