@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut warnings = Warnings::new(true);
     if unseen > UNSEEN {
         args.limits.check_seen(unseen)?;
-        warnings.add([words_of_unseen(unseen)]);
+        warnings.insist([words_of_unseen(unseen)]);
     }
     let metrics = metrics::compare(&a, &b);
     let exceeded = args.limits.exceeded(&metrics)?;

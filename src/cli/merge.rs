@@ -35,7 +35,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let Merged { film, gaps, filtered } = render::merge(&args.files)?;
     image::write(&args.output, &film, &WriteOptions::default())?;
     let missing = |Gap { seed, first, last }| format!("samples {first} to {last} of seed {seed} are missing");
-    Warnings::new(true).add(gaps.into_iter().map(missing));
+    Warnings::new(true).insist(gaps.into_iter().map(missing));
     if let Some((part, filter)) = filtered.first() {
         let (part, output) = (part.display(), quoted(&args.output.display().to_string()));
         complain(&format!(

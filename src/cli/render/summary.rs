@@ -69,9 +69,6 @@ pub fn text(args: &Args, s: &Summary) -> String {
     }
     text += &s.plan.as_ref().map_or_else(String::new, |plan| plan_lines(args, plan, s.gpu_ms));
     text += &stop_line(s.stopped);
-    if s.broken_priorities > 0 {
-        text += &format!("warning: {} priorities were not finite and counted for nothing\n", s.broken_priorities);
-    }
     if let Some(c) = &s.counters {
         let per_ray = c.nodes as f64 / c.rays().max(1) as f64;
         text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);

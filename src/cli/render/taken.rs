@@ -61,6 +61,8 @@ pub fn shoot<'gpu>(
         return Ok(None);
     }
     warnings.insist(status.broken_samples.iter().map(words_of_broken));
+    let broken = status.broken_priorities;
+    warnings.insist((broken > 0).then(|| format!("{broken} priorities were not finite and counted for nothing")));
     let seconds = host.seconds("render");
     let film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| job.renderer.counters()).transpose()?;
@@ -108,17 +110,20 @@ impl Taken<'_> {
         warnings: &mut Warnings,
     ) -> Result<Vec<PathBuf>> {
         let noisy = self.noisy.take().filter(|_| self.is_whole());
+        let infinite = non_finite(&self.film);
+        warnings.insist(words_of_non_finite(infinite, 0));
         if let Some((method, noisy)) = args.denoise.zip(noisy) {
             if alone {
                 self.save_noisy(args, warnings)?;
             }
             self.filter(method, noisy, plan.is_some())?;
+            warnings.insist(words_of_non_finite(non_finite(&self.film), infinite));
         }
         let written = self.write_all(args, plan, warnings)?;
         if alone {
             self.files.end();
         }
-        let summary = Summary { warnings: warnings.all().to_vec(), ..self.summary(plan, &written) };
+        let summary = self.summary(plan, &written, warnings.all());
         args.common.report(&summary, || text(args, &summary))?;
         self.files.check()?;
         Ok(written)
@@ -156,8 +161,6 @@ impl Taken<'_> {
     fn write_all(&mut self, args: &Args, plan: Option<&Plan>, warnings: &mut Warnings) -> Result<Vec<PathBuf>> {
         let whole = self.is_whole();
         let Self { gpu, film, host, status, files, checkpoint, .. } = self;
-        let broken = film.picture(None).map_or(0, |picture| picture.non_finite());
-        warnings.insist((broken > 0).then(|| format!("{broken} pixels are not finite")));
         let images = outputs::items(args, film);
         let save = || Ok(outputs::save(&images, film, files, checkpoint.take(), whole, warnings));
         let mut written = host.time("write", save)?;
@@ -170,8 +173,8 @@ impl Taken<'_> {
         Ok(written)
     }
 
-    /// In numbers, with the plan that it followed and the files that were written.
-    fn summary(&self, plan: Option<&Plan>, written: &[PathBuf]) -> Summary {
+    /// In numbers, with the plan that it followed, the files that were written and what was warned of.
+    fn summary(&self, plan: Option<&Plan>, written: &[PathBuf], warnings: &[String]) -> Summary {
         let Self { gpu, film, host, status, counters, notes, .. } = self;
         let counts = film.words("samples").unwrap_or_default();
         let gpu_ms = total_ms(&status.times);
@@ -197,9 +200,19 @@ impl Taken<'_> {
             gpu_ms,
             passes: table::summarise(&status.times),
             notes: notes.iter().cloned().chain(missed).collect(),
-            warnings: Vec::new(),
+            warnings: warnings.to_vec(),
         }
     }
+}
+
+/// How many pixels of the picture have a number that is not finite.
+fn non_finite(film: &Film) -> usize {
+    film.picture(None).map_or(0, |picture| picture.non_finite())
+}
+
+/// Of pixels of which `told` are known: a filter spreads those of its input, or leaves them out.
+fn words_of_non_finite(count: usize, told: usize) -> Option<String> {
+    (count > told).then(|| format!("{count} pixels are not finite"))
 }
 
 /// It is a bug, light too strong for the numbers, or too much work for a path on llvmpipe.
@@ -209,4 +222,18 @@ fn words_of_broken(broken: &BrokenSamples) -> String {
         "wrong samples: {count}, which were no number and count as black, or whose rays meet so much that the driver \
          stopped them early; the first: pixel ({x}, {y}), sample {sample}, seed {seed}"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_that_are_not_finite_are_told_once() {
+        let mut film = Film::new(3, 1);
+        film.add_vec3("", ["R", "G", "B"], &vec![[1.0, f32::NAN, 1.0], [f32::INFINITY; 3], [1.0; 3]]);
+        let count = non_finite(&film);
+        assert_eq!(words_of_non_finite(count, 0).as_deref(), Some("2 pixels are not finite"));
+        assert_eq!((words_of_non_finite(count, count), words_of_non_finite(0, 0)), (None, None));
+    }
 }
