@@ -52,7 +52,7 @@ fn usage_errors_are_one_line_and_exit_2() {
         ("render s.toml --spp=", "expected a whole number (see"),
         ("render s.toml --spp 99999999999999999999", "the number is too large (see"),
         ("filter a.exr b.png", "'b.png' found; tip: what is written is named by -o b.png (see"),
-        ("sequence s.toml f.#.png", "'f.#.png' found; tip: what is written is named by -o f.#.png (see"),
+        ("sequence s.toml f.#.png", "'f.#.png' found; tip: what is written is named by -o 'f.#.png' (see"),
         ("bench s.toml", "tip: here that is tallow profile (tallow cost for filters and policies) (see"),
         ("info", "tip: here that is tallow devices, or tallow explain for a scene (see"),
     ] {
