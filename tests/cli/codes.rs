@@ -60,9 +60,7 @@ fn usage_errors_are_one_line_and_exit_2() {
     }
     // Names of neither images nor scenes are answered by neither tip.
     std::fs::write(folder.path().join("a.txt"), "").unwrap();
-    for words in
-        ["render s.toml b.toml", "render s.toml a.tif", "sequence s.toml a.png", "explain s.toml a.png", "a.txt"]
-    {
+    for words in ["render s.toml b.toml", "render s.toml a.tif", "sequence s.toml a.png", "devices a.png", "a.txt"] {
         let output = run(&words.split(' ').collect::<Vec<_>>());
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && !said.contains("-o ") && !said.contains("to render it"), "{said}");
