@@ -231,7 +231,7 @@ mod tests {
     #[test]
     fn pixels_that_are_not_finite_are_told_once() {
         let mut film = Film::new(3, 1);
-        film.add_vec3("", ["R", "G", "B"], &vec![[1.0, f32::NAN, 1.0], [f32::INFINITY; 3], [1.0; 3]]);
+        film.add_vec3("", ["R", "G", "B"], &[[1.0, f32::NAN, 1.0], [f32::INFINITY; 3], [1.0; 3]]);
         let count = non_finite(&film);
         assert_eq!(words_of_non_finite(count, 0).as_deref(), Some("2 pixels are not finite"));
         assert_eq!((words_of_non_finite(count, count), words_of_non_finite(0, 0)), (None, None));
