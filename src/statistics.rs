@@ -1,7 +1,8 @@
 //! The statistics of a pixel's samples, and how those of two disjoint sets of samples are combined.
 use crate::layout::{PixelLight, PixelStats, vec3};
 use crate::math::srgb::luminance;
-use crate::shaders::accumulate::{ASTRAY, MIN_ALBEDO};
+use crate::shaders::accumulate::MIN_ALBEDO;
+use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -62,6 +63,7 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
     if n == 0.0 {
         return *a;
     }
+    let (a, b) = (&with_key_light(a, b), &with_key_light(b, a));
     let mean = |x: vec3, y: vec3| -> vec3 {
         std::array::from_fn(|i| (f64::from(x[i]) + (f64::from(y[i]) - f64::from(x[i])) * nb / n) as f32)
     };
@@ -84,20 +86,34 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
             direct: mean(a.light.direct, b.light.direct),
             indirect_m2: squares([a.light.indirect_m2, b.light.indirect_m2], off),
             albedo: joined_albedo(a, b, mean(a.light.albedo, b.light.albedo)),
-            remainder: if is_astray(a) && is_astray(b) { ASTRAY } else { 0 },
+            remainder: [ALL_ASTRAY, ALL_PASSED_OVER]
+                .into_iter()
+                .filter(|mark| is_all(a, *mark) && is_all(b, *mark))
+                .sum(),
             ..Default::default()
         },
     }
 }
 
-/// Whether no sample tells what the pixel's glass shows.
-fn is_astray(p: &Pixel) -> bool {
-    p.stats.count == 0 || p.light.remainder & ASTRAY != 0
+/// Whether all samples of a pixel have a mark of `glsl/shared/sample_marks.glsl`.
+fn is_all(p: &Pixel, mark: u32) -> bool {
+    p.stats.count == 0 || p.light.remainder & mark != 0
+}
+
+/// A part whose samples all passed over the key light, with the direct light of the other one, as `glsl/film/accumulate.comp` has it.
+fn with_key_light(part: &Pixel, other: &Pixel) -> Pixel {
+    let mut part = *part;
+    if is_all(&part, ALL_PASSED_OVER) && !is_all(other, ALL_PASSED_OVER) {
+        let light = &mut part.light;
+        light.direct =
+            std::array::from_fn(|c| if light.albedo[c] > MIN_ALBEDO { other.light.direct[c] } else { light.direct[c] });
+    }
+    part
 }
 
 /// Samples that all went ways that few take give way to others, but where these reflect nothing: as `glsl/film/accumulate.comp` has it.
 fn joined_albedo(a: &Pixel, b: &Pixel, mean: vec3) -> vec3 {
-    let usual = match [a, b].map(is_astray) {
+    let usual = match [a, b].map(|part| is_all(part, ALL_ASTRAY)) {
         [true, false] => b,
         [false, true] => a,
         _ => return mean,
@@ -151,10 +167,21 @@ mod tests {
             (part.light.albedo, part.light.remainder) = (albedo, remainder);
             part
         };
-        let (astray, usual) = (with([1.0; 3], ASTRAY), with([0.25, 0.0, 0.5], 0));
+        let (astray, usual) = (with([1.0; 3], ALL_ASTRAY), with([0.25, 0.0, 0.5], 0));
         let light = |a: &Pixel, b: &Pixel| (join(a, b).light.albedo, join(a, b).light.remainder);
         assert_eq!([light(&astray, &usual), light(&usual, &astray)], [([0.25, 0.5, 0.5], 0); 2]);
-        assert_eq!((light(&astray, &astray), join(&astray, &Pixel::default())), (([1.0; 3], ASTRAY), astray));
+        assert_eq!((light(&astray, &astray), join(&astray, &Pixel::default())), (([1.0; 3], ALL_ASTRAY), astray));
+        // A part that saw nothing of the key light, whose direct light is 0, counts as if it had seen what the other did, so that the
+        // rest of its light, of mean 2 and none of which is direct, is of mean 0.5; that of the other is 2.5.
+        let lit = |direct: f32, remainder: u32, values: &[f64]| {
+            let mut part = of(values);
+            (part.light.direct, part.light.albedo, part.light.remainder) = ([direct; 3], [0.5, 0.5, 0.0], remainder);
+            part
+        };
+        let (unlit, usual) = (lit(0.0, ALL_PASSED_OVER, &[1.0, 3.0]), lit(1.5, 0, &[3.0, 5.0]));
+        let light = |a: &Pixel, b: &Pixel| (join(a, b).light.direct, join(a, b).light.remainder);
+        assert_eq!([light(&unlit, &usual), light(&usual, &unlit)], [([1.5, 1.5, 0.75], 0); 2], "blue keeps all light");
+        assert_eq!(light(&unlit, &unlit), ([0.0; 3], ALL_PASSED_OVER));
         let some = of(&[1.0, 2.0]);
         assert_eq!((join(&some, &Pixel::default()), join(&Pixel::default(), &some)), (some, some));
         assert_eq!(join(&Pixel::default(), &Pixel::default()), Pixel::default());

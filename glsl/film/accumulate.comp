@@ -19,6 +19,7 @@ layout(scalar, push_constant) uniform Push { FoldPush push; };
 #include "shared/first_path.glsl"
 #include "shared/loop_limit.glsl"
 #include "shared/next_sample.glsl"
+#include "shared/sample_marks.glsl"
 const uint PLAIN = 2048u; // loop turns before strides: see shared/loop_limit.glsl
 
 // Indirect light of a channel whose albedo is not above this stays with the direct light.
@@ -29,7 +30,6 @@ const float MAX_DEVIATION = 1e17, MAX_M2 = 1e35;
 // rounding takes off is kept (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That code takes long to
 // compile, and exists only in renders of so many samples (FX_MANY_SAMPLES).
 const uint MAX_ROUNDED_SAMPLES = 4096u;
-const uint ASTRAY = 0x80000000u; // bit of PixelLight.remainder: all samples took ways that few take
 const int BITS = 10, LIGHT_BITS = 5; // bits of a mean's remainder per channel: of all light, of direct light and of albedo
 
 // Returns where a pixel's samples lie in the batch: (first, step, number).
@@ -81,16 +81,27 @@ void fold_light(inout PixelLight l, vec3 kept, vec3 albedo, float share, uint co
 
 // The albedo of sample number `count`. That of one on a way that few take is not noted: the choice of ways would be seen as noise of
 // the albedo, which no filter takes. It counts as white, until a sample on another way comes.
-vec3 albedo_along(inout PixelLight l, vec4 noted, uint count) {
-    if (!FX_SMOOTH) return noted.rgb;
-    bool astray = noted.w == 1.0, others = count > 1u;
-    if (others && (astray || (l.remainder & ASTRAY) != 0u)) {
+vec3 albedo_along(inout PixelLight l, vec3 noted, uint marks, uint count) {
+    if (!FX_SMOOTH) return noted;
+    bool astray = (marks & ASTRAY) != 0u, others = count > 1u;
+    if (others && (astray || (l.remainder & ALL_ASTRAY) != 0u)) {
         if (astray) return l.albedo;
         // What a channel has got already is not to be divided by nothing.
-        l.albedo = mix(noted.rgb, l.albedo, lessThanEqual(noted.rgb, vec3(MIN_ALBEDO)));
+        l.albedo = mix(noted, l.albedo, lessThanEqual(noted, vec3(MIN_ALBEDO)));
     }
-    l.remainder = (l.remainder & ~ASTRAY) | (astray ? ASTRAY : 0u);
-    return noted.rgb;
+    l.remainder = (l.remainder & ~ALL_ASTRAY) | (astray ? ALL_ASTRAY : 0u);
+    return noted;
+}
+
+// The direct light of sample number `count`. One that passed over the key light counts as the mean of those before it, so that the mean has
+// no noise of that choice; or, if all before it did, as the first that does not. `whole` are channels that keep all of their light.
+vec3 direct_along(inout PixelLight l, vec3 direct, vec3 radiance, bvec3 whole, uint marks, uint count) {
+    if (!FX_SOFT) return direct;
+    bool passed_over = (marks & PASSED_OVER) != 0u, only = count == 1u || (l.remainder & ALL_PASSED_OVER) != 0u;
+    l.remainder = (l.remainder & ~ALL_PASSED_OVER) | (passed_over && only ? ALL_PASSED_OVER : 0u);
+    if (passed_over) return mix(l.direct, radiance, whole);
+    if (only) l.direct = mix(direct, l.direct, whole);
+    return direct;
 }
 
 // Adds the sample at `at`. A negative number of rays marks one that is wrong; `first_broken` is the first one's index.
@@ -102,12 +113,15 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
     float share = 1.0 / float(s.count), other = 0.0, off_other = 0.0;
     if (FX_SPLIT) {
         vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
-        vec3 albedo = albedo_along(l, texelFetch(samples, 3 * at + 2), s.count);
-        bvec3 kept = lessThanEqual(albedo, vec3(MIN_ALBEDO));
-        other = luminance(mix(indirect, vec3(0.0), kept));
-        off_other = other - luminance(s.mean - l.direct);
+        vec4 noted = texelFetch(samples, 3 * at + 2);
+        uint marks = uint(noted.w);
+        vec3 albedo = albedo_along(l, noted.rgb, marks, s.count);
+        bvec3 whole = lessThanEqual(albedo, vec3(MIN_ALBEDO));
         radiance = direct + indirect;
-        fold_light(l, direct + mix(vec3(0.0), indirect, kept), albedo, share, s.count);
+        direct = direct_along(l, mix(direct, radiance, whole), radiance, whole, marks, s.count);
+        other = luminance(radiance - direct);
+        off_other = other - luminance(s.mean - l.direct);
+        fold_light(l, direct, albedo, share, s.count);
     }
     vec3 off = radiance - s.mean;
     if (!FX_MANY_SAMPLES || s.count <= MAX_ROUNDED_SAMPLES) s.mean += off * share;

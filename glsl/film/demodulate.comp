@@ -2,6 +2,7 @@
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
 #include "shared/luminance.glsl"
+#include "shared/sample_marks.glsl"
 
 // Takes one pixel per thread of a noisy image apart for a filter: colour = sharp + factor * filtered, where `sharp` is not
 // filtered and `filtered` is light before albedo. Twin: denoise::twin::demodulate.
@@ -30,10 +31,42 @@ struct Parts {
 
 bool sampled(int i) { return count_at(i) > 0.0 && finite(colour_at(i)); }
 
+// Pixels show one surface where their normals have at least this cosine, and one lies at most so far off the other's plane, as a share of
+// its depth.
+const float ALIKE = 0.9, OFF_PLANE = 0.02;
+const int AROUND = 2; // pixels; the weights have a standard deviation of one
+
+bool passed_over(int i) { return (PixelLight_remainder(light, i) & ALL_PASSED_OVER) != 0u; }
+
+// Whether pixel `q` tells how the key light shines on the surface that `i` shows.
+bool tells_key_light(int q, int i) {
+    vec3 normal = Guide_normal(guide, i), off = Guide_position(guide, q) - Guide_position(guide, i);
+    return sampled(q) && !passed_over(q) && reflects(albedo_at(q)) && dot(normal, Guide_normal(guide, q)) > ALIKE
+        && abs(dot(normal, off)) < OFF_PLANE * Guide_depth(guide, i);
+}
+
+// Direct light. Where all samples passed over the key light, the pixels around tell what it brings.
+vec3 direct_at(int i) {
+    vec3 own = PixelLight_direct(light, i);
+    if (!passed_over(i)) return own;
+    ivec2 size = ivec2(push.size), at = ivec2(i % size.x, i / size.x);
+    const int side = 2 * AROUND + 1;
+    vec4 sum = vec4(0.0);
+    for (int k = 0; k < side * side; k++) {
+        ivec2 off = ivec2(k % side, k / side) - AROUND, tap = at + off;
+        if (any(lessThan(tap, ivec2(0))) || any(greaterThanEqual(tap, size))) continue;
+        int q = tap.y * size.x + tap.x;
+        if (!tells_key_light(q, i)) continue;
+        float weight = exp(-0.5 * float(off.x * off.x + off.y * off.y));
+        sum += weight * vec4(number(PixelLight_direct(light, q) / divisor(albedo_at(q))), 1.0);
+    }
+    return own + max(number(albedo_at(i)), vec3(0.0)) * sum.rgb / max(sum.w, 1e-20);
+}
+
 // The albedo that light is divided by and multiplied with is that of the samples, so that edges and textures keep their
 // antialiasing: a pixel that shows a surface in part has a part of its albedo.
 Parts split_light(int i) {
-    vec3 factor = max(number(albedo_at(i)), vec3(0.0)), direct = PixelLight_direct(light, i);
+    vec3 factor = max(number(albedo_at(i)), vec3(0.0)), direct = direct_at(i);
     return Parts(number((colour_at(i) - direct) / factor), factor, number(direct));
 }
 
@@ -153,10 +186,9 @@ vec3 variance_of_colour(int i, float count) {
 vec3 variance_of_filtered(int i, Parts p, float count) {
     vec3 factor = p.factor;
     if (DEMODULATION == LIGHT && INDIRECT_VARIANCE) {
-        PixelLight l = PixelLight_load(light, i);
-        float of_mean = count > 1.0 ? l.indirect_m2 / (count * (count - 1.0)) : 0.0;
-        vec3 other = colour_at(i) - l.direct;
-        vec3 deviation = (LENS ? other : p.filtered) * number(sqrt(of_mean) / abs(luminance(other)));
+        float of_mean = count > 1.0 ? PixelLight_indirect_m2(light, i) / (count * (count - 1.0)) : 0.0;
+        vec3 other = colour_at(i) - (LENS ? direct_at(i) : p.sharp);
+        vec3 deviation = (LENS ? other : p.filtered) * number(sqrt(of_mean) / luminance(abs(other)));
         if (LENS) deviation = number(mix(deviation, sqrt(variance_of_colour(i, count)), blur_at(i)) / factor);
         return deviation * deviation;
     }

@@ -1,11 +1,12 @@
 #include "shared/thread.glsl"
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
+#include "shared/sample_marks.glsl"
 
 // Divides the direct light of one pixel per thread by albedo, so that textures stay sharp; light of pixels without albedo, such as
 // lamps, stays as it is. Pixels without a finite value get count 0, and a filter in-paints them. Those that show a surface in part
 // and beside it sky or a lamp, whose light is not for that part's albedo to divide, get a negative count: they keep what they have,
-// and no other pixel takes it. Twin: denoise::twin::demodulate_direct.
+// and no other pixel takes it. So do those whose samples all passed over the key light. Twin: denoise::twin::demodulate_direct.
 layout(local_size_x = 64) in;
 layout(scalar, binding = 3) writeonly buffer Direct { vec4 direct[]; };
 layout(scalar, push_constant) uniform Push { SizePush push; };
@@ -30,5 +31,6 @@ void main() {
     float count = count_at(int(i));
     vec3 before_albedo = reflects(albedo) ? own / divisor(albedo) : own;
     bool known = count != 0.0 && finite(own);
-    direct[i] = !known ? vec4(0.0) : shows_in_part(int(i), albedo) ? vec4(vec3(0.0), -count) : vec4(before_albedo, count);
+    bool keeps = (PixelLight_remainder(light, int(i)) & ALL_PASSED_OVER) != 0u || shows_in_part(int(i), albedo);
+    direct[i] = !known ? vec4(0.0) : keeps ? vec4(vec3(0.0), -count) : vec4(before_albedo, count);
 }

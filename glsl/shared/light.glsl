@@ -17,6 +17,7 @@ struct LightSample {
     float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
     float sharp;    // of a light without extent, whose shadows are sharp, the probability that it is chosen; else 0
     uint chosen;    // index of the light
+    uint key;       // with FX_SOFT that of the key light, if the point has one; else NONE
 };
 
 // What light is sampled for.
@@ -30,10 +31,20 @@ struct Receiver {
     float alpha2;             // squared roughness of that lobe, above 0
 };
 
-// A light without extent that is chosen less often brings the noise of that choice: a filter takes it with what is soft. A sun that is
-// chosen as often as can be beside a lamp, .75, left dark specks: filtered with the rest, relMSE .041 in place of .057 at 2 samples,
-// .0051 of .028 at 4, FLIP .025 of .040 and .013 of .018.
-const float SHARP_PROBABILITY = 0.9;
+// The key light of a point is the light without extent that it chooses most often, if it does so more often than this. Its light is kept
+// apart, as its shadows are sharp; that of all others has the noise of the choice, and a filter takes it with what is soft. Of four samples
+// one chooses it where the choices are spread evenly.
+const float KEY_PROBABILITY = 0.4;
+
+struct KeyLight {
+    uint index;
+    float probability; // of the choice
+};
+
+// Takes a light without extent for the key light, if it is chosen more often than those before.
+void consider(inout KeyLight key, uint light, float probability) {
+    if (probability > key.probability) key = KeyLight(light, probability);
+}
 
 const float MAX_ODDS = 1e30; // so that sums of odds stay finite
 
@@ -295,20 +306,23 @@ const float EVEN_SHARE = 0.05;
 // Chooses anew among the point and spot lights, one of which the table has chosen: by what each would bring if nothing were in its way
 // (resampling of all candidates: Talbot, Cline and Egbert 2005). The sun would starve lamps in its shade, so that lights at infinity
 // stay apart, as in pbrt-v4. Lights with a surface lie behind the others.
-Light choose_by_share(Receiver r, float u, out uint index) {
+Light choose_by_share(Receiver r, float u, out uint index, inout KeyLight key) {
     Light chosen = Light_load(lights, 0u);
     index = 0u;
     float sum = 0.0, number = 0.0, group = 0.0;
+    KeyLight brightest = KeyLight(NONE, 0.0); // by what it brings
     uint end = 0u;
     for (; end < push.constants.light_count; end++) {
         Light light = Light_load(lights, end);
         if (is_triangle_light(light.kind) || light.kind == LIGHT_SPHERE) break;
         if (!is_point_or_spot(light.kind)) continue;
         float brings = unshadowed(light, r);
+        consider(brightest, end, brings);
         sum += brings;
         number += brings > 0.0 ? 1.0 : 0.0;
         group += light.probability;
     }
+    if (FX_SOFT && sum > 0.0) consider(key, brightest.index, group * mix(brightest.probability / sum, 1.0 / number, EVEN_SHARE));
     // Each light has one interval of [0, 1), so that numbers which are spread evenly there choose lights evenly.
     float before = 0.0, share = 0.0;
     for (uint i = 0u; i < end && sum > 0.0 && u >= before; i++) {
@@ -334,17 +348,36 @@ float lamp_density(uint material, float brightness) {
     return FX_LIGHT_TREE && FX_TEXTURES && brightness > 0.0 ? density * brightness : density;
 }
 
+// The key light among those that the table alone chooses.
+void consider_table(inout KeyLight key) {
+    for (uint i = 0u; i < push.constants.light_count; i++) {
+        uint kind = Light_kind(lights, i);
+        if (is_triangle_light(kind) || kind == LIGHT_SPHERE) break;
+        bool alone = kind == LIGHT_DIRECTIONAL || (!FX_WEIGHED_LIGHTS && is_point_or_spot(kind));
+        if (alone) consider(key, i, Light_probability(lights, i));
+    }
+}
+
 // Samples one light for a receiver. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(Receiver r, uint word, vec2 u) {
     vec3 p = r.position;
-    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, 0.0, 0u);
+    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, 0.0, 0u, NONE);
+    KeyLight key = KeyLight(NONE, KEY_PROBABILITY);
     uint count = push.constants.light_count, index = 0u, rest = word;
     float probability = 0.0;
-    if (FX_LIGHT_TREE) index = choose_light(r, rest, probability);
+    if (FX_LIGHT_TREE) index = choose_light(r, rest, probability, key);
     else if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, rest);
     Light light = Light_load(lights, index);
     if (FX_LIGHT_TREE && probability > 0.0) light.probability = probability;
-    if (FX_WEIGHED_LIGHTS && is_point_or_spot(light.kind)) light = choose_by_share(r, u.x, index);
+    if (FX_SOFT && !FX_LIGHT_TREE) consider_table(key);
+    if (FX_WEIGHED_LIGHTS && (FX_SOFT || is_point_or_spot(light.kind))) {
+        uint weighed_index;
+        Light weighed = choose_by_share(r, u.x, weighed_index, key);
+        if (is_point_or_spot(light.kind)) {
+            light = weighed;
+            index = weighed_index;
+        }
+    }
     if (FX_EMISSIVE && is_triangle_light(light.kind)) {
         sample_triangle_light(p, light, u, s);
     } else if (FX_EMISSIVE && is_sphere_light(light.kind)) {
@@ -370,6 +403,7 @@ LightSample light_sample(Receiver r, uint word, vec2 u) {
         s.pdf = nominal_pdf(density, light.probability / s.pdf, p);
     }
     s.chosen = index;
+    s.key = key.index;
     if (FX_LIGHT_TREE && probability == 0.0) s.radiance = vec3(0.0);
     return s;
 }

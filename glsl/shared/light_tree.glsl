@@ -56,8 +56,8 @@ float brought_by(LightNode node, Receiver r) {
 }
 
 // The light that `u` chooses. Multiplies `probability` by that of the choice, which is 0 if no light brings anything. `bits` fill up what
-// each step takes of the digits of `u`.
-uint choose_by_tree(Receiver r, float u, uint bits, inout float probability) {
+// each step takes of the digits of `u`. Leaves beside the way are considered for the key light: none below another node is as likely.
+uint choose_by_tree(Receiver r, float u, uint bits, inout float probability, inout KeyLight key) {
     uint at = LightNode_child(light_nodes, 0u);
     float by_odds = 1.0 - EVEN_SHARE; // the probability that odds decide, given the steps so far
     bool ends;
@@ -83,6 +83,10 @@ uint choose_by_tree(Receiver r, float u, uint bits, inout float probability) {
                 odds_here = odds;
             }
             before += part;
+            bool leaf = FX_SOFT && !FX_WEIGHED_LIGHTS && (children[i] & LIGHT_LEAF) != 0u;
+            uint light = children[i] & ~LIGHT_LEAF;
+            if (leaf && probability * part > key.probability && is_point_or_spot(Light_kind(lights, light)))
+                key = KeyLight(light, probability * part);
         }
         ends = next <= at || (next & LIGHT_LEAF) != 0u; // children lie behind their parents, so that every way ends
         at = next;
@@ -97,7 +101,7 @@ uint choose_by_tree(Receiver r, float u, uint bits, inout float probability) {
 // The light that `word` chooses: one outside of the tree by its probability, or one of the tree, for which `probability` becomes that of the
 // choice. It is 0 if no light can bring anything. Replaces `word` by its position within what chooses a light outside. Those have the last
 // of all words, in whole numbers of them: by 24 bits, one of a small probability would be chosen too often, too seldom or never.
-uint choose_light(Receiver r, inout uint word, out float probability) {
+uint choose_light(Receiver r, inout uint word, out float probability, inout KeyLight key) {
     uint hash = pcg(word), end = LightNode_child(light_nodes, 0u), light = 0u, rest = word;
     uint place = ~word, begin = 0u;
     float by_tree = LightNode_power(light_nodes, 0u);
@@ -111,11 +115,13 @@ uint choose_light(Receiver r, inout uint word, out float probability) {
             rest = word_of_unit((float(place - begin) + unit_interval(hash)) / float(words), hash);
         }
         begin += words;
+        uint beside = outside.child & ~LIGHT_LEAF;
+        if (FX_SOFT && FX_DIRECTIONAL && Light_kind(lights, beside) == LIGHT_DIRECTIONAL) consider(key, beside, float(words) * WORD);
     }
     if (by_tree > 0.0 && place >= begin) {
         float digits = UNIT_STEP * unit_interval(hash); // below those of the word, in place of those that the choice uses up
         probability = begin > 0u ? float(0u - begin) * WORD : by_tree;
-        return choose_by_tree(r, min((unit_interval(word) + digits) / probability, BELOW_ONE), pcg(hash), probability);
+        return choose_by_tree(r, min((unit_interval(word) + digits) / probability, BELOW_ONE), pcg(hash), probability, key);
     }
     word = rest;
     return light;

@@ -29,9 +29,9 @@ void add_light(inout SplitLight sum, vec3 light, uint kind) {
 
 // What light is that comes to a path by way of `scattered` surfaces that are not smooth. Smooth ones show light as it is, with
 // noise where `chosen`: where the path took one of two ways.
-uint kind_of_light(uint scattered, bool sharp, bool chosen) {
+uint kind_of_light(uint scattered, bool chosen) {
     if (scattered == 0u) return chosen ? SOFT : DIRECT;
-    return scattered >= 2u ? INDIRECT : sharp ? DIRECT : SOFT;
+    return scattered >= 2u ? INDIRECT : SOFT;
 }
 
 // Clamps the largest channel of a whole sample, not of each bounce: the limit is that of the values which a pixel averages.
@@ -49,6 +49,7 @@ struct PathState {
     uint bounce;     // surfaces that it has left
     uint scattered;  // those of them that are not smooth
     float share;     // probability of its way, where smooth ones before these let it take one of two: 0 beyond one less likely than not
+    bool passed_over; // the key light, if the first surface that is not smooth has one: another was chosen there
     uint closest_rays, any_rays;
     SplitLight light;
     vec3 albedo;     // what light is multiplied by on its way from what the path sees: see `seen_albedo`
@@ -60,9 +61,10 @@ struct Departure {
     Segment shadow;
     vec3 sampled;
     bool shadowed;
-    bool sharp; // of a light that brings sharp shadows and little noise
     float certainty; // the probability that it was chosen, if it brings sharp shadows; else 0
     uint chosen;     // its index
+    bool key;        // whether it is the key light
+    bool passed_over; // whether there is a key light, and it is not that
     bool alive;
 };
 
@@ -70,7 +72,7 @@ struct Departure {
 PathState path_state(vec3 origin, vec3 direction, bool sharp_only, uint seed) {
     SplitLight none = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
     Path path = Path(origin, direction, vec3(1.0), 0.0, true, 1.0);
-    return PathState(path, Hit(0.0, NONE, NONE, 0.0, 0.0), seed, sharp_only, 0u, 0u, 1.0, 1u, 0u, none, vec3(0.0));
+    return PathState(path, Hit(0.0, NONE, NONE, 0.0, 0.0), seed, sharp_only, 0u, 0u, 1.0, false, 1u, 0u, none, vec3(0.0));
 }
 
 // The ray from the camera, or to the next surface.
@@ -78,9 +80,13 @@ Segment next_segment(PathState p) {
     return Segment(p.path.origin, p.path.direction, INFINITE_DISTANCE, path_mask_seed(p.seed, p.bounce));
 }
 
-// Adds what was sampled at the surface that the path has left, where nothing blocks it.
-void add_sampled(inout PathState p, vec3 sampled, bool lit, bool sharp) {
-    add_light(p.light, lit ? sampled : vec3(0.0), kind_of_light(p.scattered, sharp, p.share < 1.0));
+// Adds what was sampled at the surface that the path has left, where nothing blocks it. What the key light brings is what it would if all
+// paths chose it: of paths that choose another nothing is noted (PASSED_OVER). Only what the choice adds to it is noisy.
+void add_sampled(inout PathState p, Departure d, vec3 sampled, bool lit) {
+    vec3 light = lit ? sampled : vec3(0.0);
+    float kept = FX_SOFT && d.key && p.scattered == 1u ? d.certainty : 0.0;
+    add_light(p.light, kept * light, DIRECT);
+    add_light(p.light, (1.0 - kept) * light, kind_of_light(p.scattered, p.share < 1.0));
 }
 
 // The light of a path that has ended.

@@ -54,22 +54,25 @@ Receiver receiver_of(Surface s, Bsdf bsdf, View view) {
     return r;
 }
 
-// Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed.
-vec3 light_from_nee(Surface s, Bsdf bsdf, View view, Sampler random, uint pair, uint mask_seed,
-                    out Segment shadow, out float sharp, out uint chosen) {
+// Direct light at `s` by light sampling, which counts if nothing blocks `d.shadow`; where it is 0, no ray is needed. Sets what a departure
+// knows of the light.
+vec3 light_from_nee(Surface s, Bsdf bsdf, View view, Sampler random, uint pair, uint mask_seed, inout Departure d) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(receiver_of(s, bsdf, view), word, sample_2d(random, pair + PAIR_LIGHT));
-    sharp = light.sharp;
-    chosen = light.chosen;
+    d.certainty = light.sharp;
+    d.chosen = light.chosen;
+    d.key = light.chosen == light.key;
+    d.passed_over = light.key != NONE && !d.key;
     vec3 wi = light.direction * view.basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, view.wo, wi);
     f.rgb *= light_share(s, view.facing, light.direction, wi.z);
     mask_seed |= light.pdf == 0.0 ? PASSES_WALLS : 0u;
-    shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
+    Segment shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
     if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
         shadow.direction = s.position + light.distance * light.direction - shadow.origin;
         shadow.t_max = SHADOW_END;
     }
+    d.shadow = shadow;
     return f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
 }
 
@@ -101,7 +104,7 @@ bool survives_roulette(inout Path path, Sampler random, uint pair) {
 
 // Adds the light that the path meets at its hit. Returns whether it can go on from the surface `s`: the last one samples no light.
 bool arrive(inout PathState p, out Surface s) {
-    uint kind = kind_of_light(p.scattered, false, p.share < 1.0);
+    uint kind = kind_of_light(p.scattered, p.share < 1.0);
     if (p.hit.triangle == NONE) {
         add_light(p.light, p.path.throughput * light_from_miss(p.path), kind);
         return false;
@@ -122,8 +125,8 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     bool sees = p.scattered == 0u && p.share > 0.0 && going;
     if (sees) p.albedo = seen_albedo(p.path.throughput, bsdf_albedo(bsdf, view.wo.z), p.share);
     uint seed = shadow_mask_seed(p.seed, p.bounce);
-    d.sampled = p.path.throughput * light_from_nee(s, bsdf, view, random, pair, seed, d.shadow, d.certainty, d.chosen);
-    d.sharp = d.certainty >= SHARP_PROBABILITY;
+    d.sampled = p.path.throughput * light_from_nee(s, bsdf, view, random, pair, seed, d);
+    if (FX_SOFT && going && p.scattered == 0u && !smooth_here) p.passed_over = d.passed_over;
     d.shadowed = going && push.constants.light_count > 0u && !smooth_here && largest_channel(d.sampled) > 0.0;
     d.alive = scatter(p.path, s, bsdf, view, random, pair) && going;
     if (sees && smooth_here && d.alive) {
@@ -133,7 +136,7 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     p.scattered += smooth_here ? 0u : 1u;
     // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for what is sharp there.
     bool ends = FX_SPARSE && p.sharp_only && p.scattered > (FX_SOFT ? 0u : 1u);
-    d.shadowed = d.shadowed && (!ends || (FX_SOFT && d.sharp));
+    d.shadowed = d.shadowed && (!ends || (FX_SOFT && d.key));
     d.alive = d.alive && !ends;
     bool roulette = FX_ROULETTE && push.constants.roulette_depth > 0u && p.bounce + 1u >= push.constants.roulette_depth;
     if (roulette) d.alive = survives_roulette(p.path, random, pair) && d.alive;

@@ -1,7 +1,8 @@
 // What a path leaves behind: one vec4 (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). With
 // FX_SOFT what lamps and sky bring to the first hit goes with indirect light, since it is as noisy. w of the first is the number of
-// rays, negated where the sample is wrong: its light was not finite, and it is black, or its path `ended_early`. w of the last is 1
-// where smooth surfaces sent the path a way that few take: its albedo is not that of what the pixel shows.
+// rays, negated where the sample is wrong: its light was not finite, and it is black, or its path `ended_early`. w of the last holds the
+// bits of sample_marks.glsl.
+#include "shared/sample_marks.glsl"
 #include "shared/finite.glsl"
 #include "shared/path_state.glsl"
 #include "shared/counters.glsl"
@@ -21,7 +22,7 @@ void store_sample(uint i, uint pixel, PathState p, bool ended_early) {
     if (FX_SPLIT) {
         samples[3u * i] = pack64(vec4(light.direct, rays));
         samples[3u * i + 1u] = pack64(vec4(light.indirect, 0.0));
-        samples[3u * i + 2u] = pack64(vec4(p.albedo, float(p.share == 0.0)));
+        samples[3u * i + 2u] = pack64(vec4(p.albedo, float((p.share == 0.0 ? ASTRAY : 0u) | (p.passed_over ? PASSED_OVER : 0u))));
     } else {
         samples[i] = pack64(vec4(light.direct + light.indirect, rays));
     }

@@ -22,7 +22,7 @@ void trace_path(inout PathState p, bool on, Sampler random) {
         if (DEALT) p.hit = deal_shadow_then_closest(d.shadow, d.shadowed, next, d.alive, push.constants.root, from);
         else p.hit = trace_shadow_then_closest(d.shadow, d.shadowed, next, d.alive, push.constants.root, from);
         vec3 sampled = behind_walls(d.sampled);
-        add_sampled(p, sampled, lit && !d.shadowed, d.sharp);
+        add_sampled(p, d, sampled, lit && !d.shadowed);
         if (p.scattered == 1u && certain_choice == NONE && p.share == 1.0 && push.constants.light_count > 0u) {
             certain_choice = d.chosen;
             certain_light = lit && !d.shadowed ? d.certainty * sampled : vec3(0.0);

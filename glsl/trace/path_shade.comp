@@ -20,7 +20,7 @@ void main() {
     Departure d;
     PathState p = saved_path(i, d);
     p.sharp_only = FX_SPARSE && !is_traced_whole(pixel);
-    add_sampled(p, d.sampled, d.shadowed, d.sharp);
+    add_sampled(p, d, d.sampled, d.shadowed);
     Surface s;
     bool going = d.alive && arrive(p, s);
     if (going) d = leave(p, s, true, path_sampler(pixel, index));

@@ -6,8 +6,9 @@ use super::{Demodulation, Holds};
 use crate::image::aov::Aovs;
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::demodulate::{MIRRORED, OUTLIER};
+use crate::shaders::demodulate::{ALIKE, AROUND, MIRRORED, OFF_PLANE, OUTLIER};
 use crate::shaders::shared::albedo::{SMALLEST_ALBEDO, WHOLE};
+use crate::shaders::shared::sample_marks::ALL_PASSED_OVER;
 use glam::Vec3;
 
 /// A noisy image on the host: see [`super::Noisy`].
@@ -75,6 +76,11 @@ impl Pixels {
         self.count(i) > 0.0 && self.stats[i].mean.iter().all(|v| v.is_finite())
     }
 
+    /// Whether no sample tells of the key light.
+    fn passed_over(&self, i: usize) -> bool {
+        self.light[i].remainder & ALL_PASSED_OVER != 0
+    }
+
     fn count(&self, i: usize) -> f32 {
         if self.holds.of_file { f32::from_bits(self.stats[i].count) } else { self.stats[i].count as f32 }
     }
@@ -127,7 +133,7 @@ fn demodulate_direct(pixels: &Pixels) -> Vec<vec4> {
         let [r, g, b] = std::array::from_fn(|c| direct[c] / factor[c]);
         match pixels.count(i) != 0.0 && direct.iter().all(|v| v.is_finite()) {
             false => [0.0; 4],
-            true if shows_in_part(pixels, i) => [0.0, 0.0, 0.0, -pixels.count(i)],
+            true if pixels.passed_over(i) || shows_in_part(pixels, i) => [0.0, 0.0, 0.0, -pixels.count(i)],
             true => [r, g, b, pixels.count(i)],
         }
     };
@@ -187,10 +193,38 @@ fn part(pixels: &Pixels, demodulation: Demodulation, i: usize) -> Part {
 }
 
 fn split_light(pixels: &Pixels, i: usize) -> Part {
-    let (direct, colour) = (pixels.light[i].direct, pixels.stats[i].mean);
+    let (direct, colour) = (direct_at(pixels, i), pixels.stats[i].mean);
     let factor = pixels.albedo(i).map(|a| number(a).max(0.0));
     let filtered = |c: usize| number((colour[c] - direct[c]) / factor[c]);
     Part { filtered: std::array::from_fn(filtered), factor, sharp: direct.map(number) }
+}
+
+/// Whether pixel `q` tells how the key light shines on the surface that `i` shows.
+fn tells_key_light(pixels: &Pixels, q: usize, i: usize) -> bool {
+    let (own, theirs) = (&pixels.guide[i], &pixels.guide[q]);
+    let normal = Vec3::from(own.normal);
+    let off = normal.dot(Vec3::from(theirs.position) - Vec3::from(own.position));
+    let known = pixels.sampled(q) && !pixels.passed_over(q) && reflects(pixels.albedo(q));
+    known && normal.dot(theirs.normal.into()) > ALIKE && off.abs() < OFF_PLANE * own.depth
+}
+
+/// Direct light. Where all samples passed over the key light, the pixels around tell what it brings.
+fn direct_at(pixels: &Pixels, i: usize) -> vec3 {
+    let own = pixels.light[i].direct;
+    if !pixels.passed_over(i) {
+        return own;
+    }
+    let width = pixels.size[0] as usize;
+    let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+    for q in neighbours(pixels.size, i, AROUND as usize).filter(|&q| tells_key_light(pixels, q, i)) {
+        let off = [(q % width).abs_diff(i % width), (q / width).abs_diff(i / width)];
+        let weight = (-0.5 * (off[0] * off[0] + off[1] * off[1]) as f32).exp();
+        let (direct, divisor) = (pixels.light[q].direct, divisor(pixels.albedo(q)));
+        sum += weight * Vec3::from_array(std::array::from_fn(|c| number(direct[c] / divisor[c])));
+        weights += weight;
+    }
+    let albedo = pixels.albedo(i).map(|a| number(a).max(0.0));
+    (Vec3::from(own) + Vec3::from(albedo) * sum / weights.max(1e-20)).into()
 }
 
 /// For a pixel of lamps or sky without a sample: the mean of the pixels around that show some.
@@ -221,9 +255,10 @@ fn blurred(pixels: &Pixels, i: usize, blur: Option<f32>, p: Part) -> Part {
 fn variance(pixels: &Pixels, demodulation: Demodulation, i: usize, blur: Option<f32>, part: &Part) -> vec3 {
     let Part { filtered, factor, .. } = part;
     if demodulation == Demodulation::Light && pixels.holds.indirect_variance {
-        let other = Vec3::from(pixels.stats[i].mean) - Vec3::from(pixels.light[i].direct);
+        let other = Vec3::from(pixels.stats[i].mean)
+            - Vec3::from(if blur.is_some() { direct_at(pixels, i) } else { part.sharp });
         let of_mean = variance_of_mean(pixels.light[i].indirect_m2, pixels.count(i));
-        let relative = number(of_mean.sqrt() / luminance(other).abs());
+        let relative = number(of_mean.sqrt() / luminance(other.abs()));
         let Some(share) = blur else { return filtered.map(|light| (light * relative).powi(2)) };
         let whole = variance_of_colour(pixels, i);
         let deviation = |c: usize| number((other[c] * relative * (1.0 - share) + whole[c].sqrt() * share) / factor[c]);

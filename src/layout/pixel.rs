@@ -36,7 +36,8 @@ gpu_structs! {
 
     /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`]. 2 texels.
     struct PixelLight {
-        /// Radiance that needs no filter: emission that is seen, and direct light (with FX_SOFT that of a delta light that most samples choose).
+        /// Radiance that needs no filter: emission that is seen, and direct light; with FX_SOFT that of the key light alone (see
+        /// `glsl/shared/light.glsl`), by the samples that chose it.
         direct: vec3,
         /// Sum of squared deviations of the luminance of all other light, as [`PixelStats::m2`].
         indirect_m2: float,
@@ -44,8 +45,8 @@ gpu_structs! {
         /// none, times theirs; samples that show emission alone count as 0. Of what clear glass shows, that by the way that most samples
         /// take, mixed with white by the share of the others.
         albedo: vec3,
-        /// As [`PixelStats::remainder`]: six numbers of 5 bits, in units of 2^-5; those of `direct` are the lowest. The highest bit is set
-        /// where all samples went ways that few take.
+        /// As [`PixelStats::remainder`]: six numbers of 5 bits, in units of 2^-5; those of `direct` are the lowest. The two
+        /// highest bits are those of `glsl/shared/sample_marks.glsl` that tell what no sample has seen.
         remainder: uint,
     }
 

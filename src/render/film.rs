@@ -37,7 +37,9 @@ pub(crate) const BLUR: &str = "denoising blur";
 
 /// What rounding took off the means of pixels with thousands of samples, and whether all samples of a pixel went ways that few take:
 /// only in files that have such pixels.
-const REMAINDERS: [&str; 2] = ["remainder", "light.remainder"];
+/// As [`crate::layout::PixelLight::remainder`].
+pub(crate) const LIGHT_REMAINDER: &str = "light.remainder";
+const REMAINDERS: [&str; 2] = ["remainder", LIGHT_REMAINDER];
 
 /// Metadata of samples that are wrong.
 const BROKEN: &str = "brokenSamples";
@@ -160,7 +162,7 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
     }
 }
 
-/// Only pixels with thousands of samples, or that show glass, have any.
+/// Only pixels with thousands of samples, that show glass, or few of whose samples choose the key light have any.
 fn drop_remainders_of_none(film: &mut Film) {
     let is_zero = |samples: &Samples| matches!(samples, Samples::U32(words) if words.iter().all(|&word| word == 0));
     film.channels.retain(|c| !(REMAINDERS.contains(&c.name.as_str()) && is_zero(&c.samples)));

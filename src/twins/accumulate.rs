@@ -3,7 +3,8 @@ use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::{pcg, unit_interval};
 use crate::math::srgb::luminance;
 use crate::shaders;
-use crate::shaders::accumulate::{ASTRAY, MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
+use crate::shaders::accumulate::{MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
+use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, ASTRAY, PASSED_OVER};
 use crate::statistics::next_sample;
 use glam::{Vec3, Vec4};
 
@@ -14,16 +15,26 @@ const LIGHT_BITS: u32 = shaders::accumulate::LIGHT_BITS as u32;
 /// What a sample brings besides its radiance.
 struct Split {
     /// Light that needs no filter.
-    kept: Vec3,
-    /// All other light.
-    other: Vec3,
+    direct: Vec3,
     albedo: Vec3,
 }
 
-fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> Split {
-    let keeps = albedo.cmple(Vec3::splat(MIN_ALBEDO));
-    let kept = direct + Vec3::select(keeps, indirect, Vec3::ZERO);
-    Split { kept, other: Vec3::select(keeps, Vec3::ZERO, indirect), albedo }
+/// Parts the light of sample number `count`. w of `noted` holds its marks: see the kernel.
+fn split(l: &mut PixelLight, direct: Vec3, radiance: Vec3, noted: Vec4, count: u32) -> Split {
+    let marks = noted.w as u32;
+    let albedo = albedo_along(l, noted.truncate(), marks & ASTRAY != 0, count);
+    let whole = albedo.cmple(Vec3::splat(MIN_ALBEDO));
+    let direct = Vec3::select(whole, radiance, direct);
+    let passed_over = marks & PASSED_OVER != 0;
+    let only = count == 1 || l.remainder & ALL_PASSED_OVER != 0;
+    l.remainder = (l.remainder & !ALL_PASSED_OVER) | if passed_over && only { ALL_PASSED_OVER } else { 0 };
+    if passed_over {
+        return Split { direct: Vec3::select(whole, radiance, l.direct.into()), albedo };
+    }
+    if only {
+        l.direct = Vec3::select(whole, l.direct.into(), direct).into();
+    }
+    Split { direct, albedo }
 }
 
 /// Adds a batch to the statistics of all pixels. `samples`: sample k of pixel i at `k * push.pixels + i`, one vec4, or
@@ -47,12 +58,12 @@ pub fn fold(
             }
             if split_light {
                 let [direct, indirect] = [0, 1].map(|j| Vec4::from(samples[record + j]).truncate());
-                let albedo = albedo_along(&mut light[pixel], samples[record + 2].into(), stats[pixel].count + 1);
-                let (split, before) = (split(direct, indirect, albedo), other(&stats[pixel], &light[pixel]));
-                fold_radiance(&mut stats[pixel], direct + indirect);
-                fold_light(&mut light[pixel], &split, stats[pixel].count);
-                let (added, l) = (luminance(split.other), &mut light[pixel]);
-                let squares = cut_product(added - before, added - other(&stats[pixel], l));
+                let (s, l, radiance) = (&mut stats[pixel], &mut light[pixel], direct + indirect);
+                let split = split(l, direct, radiance, samples[record + 2].into(), s.count + 1);
+                let (added, before) = (luminance(radiance - split.direct), other(s, l));
+                fold_radiance(s, radiance);
+                fold_light(l, &split, s.count);
+                let squares = cut_product(added - before, added - other(s, l));
                 l.indirect_m2 = (l.indirect_m2 + squares).clamp(0.0, MAX_M2);
             } else {
                 fold_radiance(&mut stats[pixel], Vec4::from(samples[record]).truncate());
@@ -130,24 +141,23 @@ fn other(s: &PixelStats, l: &PixelLight) -> f32 {
     luminance(Vec3::from(s.mean) - Vec3::from(l.direct))
 }
 
-/// The albedo of sample number `count`, which w of `noted` tells to have gone astray: see the kernel.
-fn albedo_along(l: &mut PixelLight, noted: Vec4, count: u32) -> Vec3 {
-    let astray = noted.w == 1.0;
+/// The albedo of sample number `count`.
+fn albedo_along(l: &mut PixelLight, seen: Vec3, astray: bool, count: u32) -> Vec3 {
     if count > 1 && astray {
         return l.albedo.into();
     }
-    if count > 1 && l.remainder & ASTRAY != 0 {
-        let (seen, white) = (noted.truncate(), Vec3::from(l.albedo));
+    if count > 1 && l.remainder & ALL_ASTRAY != 0 {
+        let white = Vec3::from(l.albedo);
         l.albedo = Vec3::select(seen.cmple(Vec3::splat(MIN_ALBEDO)), white, seen).into();
     }
-    l.remainder = (l.remainder & !ASTRAY) | if astray { ASTRAY } else { 0 };
-    noted.truncate()
+    l.remainder = (l.remainder & !ALL_ASTRAY) | if astray { ALL_ASTRAY } else { 0 };
+    seen
 }
 
 fn fold_light(l: &mut PixelLight, s: &Split, count: u32) {
     let share = 1.0 / count as f32;
     let (direct, albedo) = (Vec3::from(l.direct), Vec3::from(l.albedo));
-    let [by, albedo_by] = [(s.kept - direct) * share, (s.albedo - albedo) * share];
+    let [by, albedo_by] = [(s.direct - direct) * share, (s.albedo - albedo) * share];
     let [direct, albedo] = match count <= MAX_ROUNDED_SAMPLES {
         true => [direct + by, albedo + albedo_by],
         false => {
@@ -175,8 +185,8 @@ mod tests {
 
     #[test]
     fn light_without_albedo_stays_direct() {
-        let s = split(Vec3::ONE, Vec3::splat(2.0), glam::vec3(0.5, 0.0, 1.0));
-        assert_eq!((s.kept, s.other), (glam::vec3(1.0, 3.0, 1.0), glam::vec3(2.0, 0.0, 2.0)));
+        let s = split(&mut PixelLight::default(), Vec3::ONE, Vec3::splat(3.0), glam::vec4(0.5, 0.0, 1.0, 0.0), 1);
+        assert_eq!(s.direct, glam::vec3(1.0, 3.0, 1.0));
     }
 
     #[test]
@@ -200,6 +210,37 @@ mod tests {
         fold(&FoldPush { pixels: 1, samples: 2, ..FoldPush::default() }, true, &samples, &mut stats, &mut light);
         let PixelLight { direct, albedo, .. } = light[0];
         assert_eq!((stats[0].mean, direct, albedo), ([2.5; 3], [2.0; 3], [0.5; 3]), "nothing is lost");
+    }
+
+    #[test]
+    fn samples_that_pass_over_the_key_light_count_as_the_others() {
+        // Choices of a light that brings 3 half of the time: 3 of it are direct, and 3 more in place of what is not chosen; the other light
+        // brings 1, 2 where it is chosen. All light is 4 on average, direct light 3 without noise, the rest 1 +- 2 or 1.
+        let (key, other) = ([[3.0; 4], [3.0; 4], [0.5, 0.5, 0.5, 0.0]], [[0.0; 4], [2.0; 4], [0.5, 0.5, 0.5, 2.0]]);
+        let folded = |samples: &[[vec4; 3]]| {
+            let (mut stats, mut light) = ([PixelStats::default()], [PixelLight::default()]);
+            for sample in samples {
+                fold(&FoldPush { pixels: 1, samples: 1, ..FoldPush::default() }, true, sample, &mut stats, &mut light);
+            }
+            (stats[0].mean[0], light[0].direct[0], light[0].indirect_m2, light[0].remainder)
+        };
+        // The rest of the four: 3, -1, -1, 3, whose squared deviations from 1 are 4 each, in any order.
+        for order in
+            [[key, other, other, key], [other, other, key, key], [key, key, other, other], [other, key, key, other]]
+        {
+            let (mean, direct, m2, remainder) = folded(&order);
+            assert_eq!((mean, direct, remainder), (4.0, 3.0, 0));
+            assert!((m2 - 16.0).abs() < 1e-4, "{m2}");
+        }
+        let (mean, direct, m2, remainder) = folded(&[other, other]);
+        assert_eq!((mean, direct, remainder), (2.0, 0.0, ALL_PASSED_OVER));
+        assert!(m2.abs() < 1e-6, "{m2}");
+        // A channel without albedo keeps all light there is.
+        let dark = |mut sample: [vec4; 3]| {
+            sample[2][0] = 0.0;
+            sample
+        };
+        assert_eq!(folded(&[dark(other), dark(key)]).1, 4.0);
     }
 
     #[test]

@@ -6,7 +6,9 @@ use crate::math::warp::{
     basis_from_normal, circle_point, sine_cosine, warp_cone, warp_sphere, warp_tent, warp_triangle,
 };
 use crate::scene::{Environment, Scene};
-use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, MIN_VOLUME};
+use crate::shaders::shared::light::{
+    EVEN_SHARE, KEY_PROBABILITY, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, MIN_VOLUME,
+};
 use crate::twins::light_tree::{Choice, choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, coat_lets_out, plane_clearance, unit_vector};
@@ -29,6 +31,29 @@ pub struct LightSample {
     pub sharp: f32,
     /// Index of the light.
     pub chosen: u32,
+    /// That of the key light of the point, or [`NONE`].
+    pub key: u32,
+}
+
+/// The light without extent that a point chooses most often, if it does so more often than [`KEY_PROBABILITY`]; else index [`NONE`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeyLight {
+    /// Index of the light.
+    pub index: u32,
+    /// Probability of the choice.
+    pub probability: f32,
+}
+
+impl KeyLight {
+    /// None so far.
+    pub const NONE: Self = Self { index: NONE, probability: KEY_PROBABILITY };
+
+    /// Takes a light without extent for it, if that is chosen more often than those before.
+    pub fn consider(&mut self, index: u32, probability: f32) {
+        if probability > self.probability {
+            *self = Self { index, probability };
+        }
+    }
 }
 
 pub use crate::shaders::shared::segment::INFINITE_DISTANCE;
@@ -103,7 +128,7 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
         }
     };
     let radiance = if pdf > 0.0 { radiance / pdf } else { Vec3::ZERO };
-    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, sharp: 0.0, chosen: 0 }
+    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, sharp: 0.0, chosen: 0, key: NONE }
 }
 
 /// A triangle seen from a point: unit vectors to its corners, and its solid angle in steradians.
@@ -198,6 +223,7 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
         pdf,
         sharp: 0.0,
         chosen: 0,
+        key: NONE,
     }
 }
 
@@ -233,6 +259,7 @@ fn sample_sphere_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightS
         pdf,
         sharp: 0.0,
         chosen: 0,
+        key: NONE,
     }
 }
 
@@ -251,13 +278,16 @@ fn unshadowed(light: &Light, r: &Receiver) -> f32 {
 
 /// Chooses anew among the point and spot lights, which lie before those with a surface: by what each would bring if nothing were in
 /// its way.
-fn choose_by_share(scene: &Scene, r: &Receiver, u: f32) -> (Light, u32) {
+fn choose_by_share(scene: &Scene, r: &Receiver, u: f32, key: &mut KeyLight) -> (Light, u32) {
     let before_surfaces = (0..).zip(&scene.lights).take_while(|(_, light)| !light.has_surface());
     let group: Vec<_> =
         before_surfaces.filter(|(_, light)| light.is_point_or_spot()).map(|(i, l)| (i, l, unshadowed(l, r))).collect();
     let probability: f32 = group.iter().map(|(_, light, _)| light.probability).sum();
     let lit = || group.iter().filter(|(.., brings)| *brings > 0.0);
     let (sum, number) = (lit().map(|(.., brings)| brings).sum::<f32>(), lit().count() as f32);
+    for &(index, _, brings) in lit() {
+        key.consider(index, probability * mixed(brings / sum, number));
+    }
     let (mut before, mut chosen) = (0.0, (Light { probability, value: [0.0; 3], ..scene.lights[0] }, 0));
     for &(index, light, brings) in lit() {
         let share = mixed(brings / sum, number);
@@ -284,7 +314,7 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     if light.kind == LIGHT_SPOT {
         radiance *= spot_share(light, direction);
     }
-    LightSample { direction, distance, radiance, pdf: 0.0, sharp: light.probability, chosen: 0 }
+    LightSample { direction, distance, radiance, pdf: 0.0, sharp: light.probability, chosen: 0, key: NONE }
 }
 
 /// Density over area by which MIS takes a lamp to be chosen.
@@ -293,23 +323,37 @@ fn lamp_density(scene: &Scene, material: u32, brightness: f32) -> f32 {
     if scene.has_light_tree() && brightness > 0.0 { density * brightness } else { density }
 }
 
+/// The key light among those that the table alone chooses.
+fn key_of_table(scene: &Scene) -> KeyLight {
+    let mut key = KeyLight::NONE;
+    for (index, light) in (0..).zip(&scene.lights).take_while(|(_, light)| !light.has_surface()) {
+        if light.kind == LIGHT_DIRECTIONAL || !scene.weighed_lights && light.is_point_or_spot() {
+            key.consider(index, light.probability);
+        }
+    }
+    key
+}
+
 /// One light for a receiver. Radiance is 0 when the light cannot reach the point.
 pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSample {
     let by_tree = scene.has_light_tree();
-    let Choice { light: chosen, rest, probability } = match by_tree {
+    let Choice { light: chosen, rest, probability, mut key } = match by_tree {
         true => choose_light(scene, r, word),
-        false if scene.lights.len() == 1 => Choice { light: 0, rest: word, probability: 0.0 },
+        false if scene.lights.len() == 1 => Choice { light: 0, rest: word, probability: 0.0, key: key_of_table(scene) },
         false => {
             let (light, rest) = alias_choose(&scene.light_table, word);
-            Choice { light, rest, probability: 0.0 }
+            Choice { light, rest, probability: 0.0, key: key_of_table(scene) }
         }
     };
     let (mut light, mut index, p) = (scene.lights[chosen as usize], chosen, r.position);
     if by_tree && probability > 0.0 {
         light.probability = probability;
     }
-    if scene.weighed_lights && light.is_point_or_spot() {
-        (light, index) = choose_by_share(scene, r, u.x);
+    if scene.weighed_lights {
+        let weighed = choose_by_share(scene, r, u.x, &mut key);
+        if light.is_point_or_spot() {
+            (light, index) = weighed;
+        }
     }
     let mut sample = match light.kind {
         _ if light.is_triangle() => sample_triangle_light(scene, &light, p, u),
@@ -322,6 +366,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
             pdf: 0.0,
             sharp: light.probability,
             chosen: 0,
+            key: NONE,
         },
         _ => sample_environment(scene, &light, rest, u),
     };
@@ -330,7 +375,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         let density = lamp_density(scene, light.material, brightness);
         sample.pdf = nominal_pdf(scene, density, light.probability / sample.pdf, p);
     }
-    sample.chosen = index;
+    (sample.chosen, sample.key) = (index, key.index);
     if by_tree && probability == 0.0 {
         sample.radiance = Vec3::ZERO;
     }

@@ -1,11 +1,12 @@
 //! Twin of `glsl/shared/light_tree.glsl`.
-use crate::layout::{LIGHT_LEAF, LIGHT_SPOT, Light, LightNode};
+use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_LEAF, LIGHT_SPOT, Light, LightNode};
 use crate::math::hash::{pcg, unit_interval, word_of_unit};
 use crate::math::octahedral::{octahedral_decode, snorms};
 use crate::scene::Scene;
 use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS};
 use crate::shaders::shared::light_tree::{CHILDREN, COSINE_SLACK, LARGEST_SEEN, LEAST_COSINES, UNIT_STEP, WORD};
 use crate::shaders::shared::pcg::BELOW_ONE;
+use crate::twins::light::KeyLight;
 use glam::Vec3;
 
 /// What light is sampled for.
@@ -95,10 +96,11 @@ pub fn brought_by(scene: &Scene, node: &LightNode, r: &Receiver) -> f32 {
     if faced && lit { (brings / d2).min(MAX_ODDS) } else { 0.0 }
 }
 
-/// The light that `u` chooses, and the probability of the choice, which is 0 if no light brings anything.
-pub fn choose_by_tree(scene: &Scene, r: &Receiver, mut u: f32, mut bits: u32) -> (u32, f32) {
+/// The light of the tree that `u` chooses, where `choice` tells the probability that the tree does, and the key light of those beside it.
+/// Leaves beside the way are considered for that, too.
+pub fn choose_by_tree(scene: &Scene, r: &Receiver, mut u: f32, mut bits: u32, mut choice: Choice) -> Choice {
     let mut at = scene.light_nodes[0].child;
-    let (mut probability, mut by_odds) = (1.0, 1.0 - EVEN_SHARE);
+    let mut by_odds = 1.0 - EVEN_SHARE;
     loop {
         let nodes = &scene.light_nodes[at as usize..(at + CHILDREN) as usize];
         let brings: Vec<f32> = nodes.iter().map(|node| brought_by(scene, node, r)).collect();
@@ -112,13 +114,15 @@ pub fn choose_by_tree(scene: &Scene, r: &Receiver, mut u: f32, mut bits: u32) ->
                 (at, start, share, odds_here) = (node.child, before, part, odds);
             }
             before += part;
+            let light = node.child & !LIGHT_LEAF;
+            if node.child & LIGHT_LEAF != 0 && scene.lights[light as usize].is_point_or_spot() {
+                choice.key.consider(light, choice.probability * part);
+            }
         }
-        if share == 0.0 {
-            return (0, 0.0);
-        }
-        probability *= share;
-        if at & LIGHT_LEAF != 0 {
-            return (at & !LIGHT_LEAF, probability);
+        choice.probability *= share;
+        if share == 0.0 || at & LIGHT_LEAF != 0 {
+            choice.light = if share > 0.0 { at & !LIGHT_LEAF } else { 0 };
+            return choice;
         }
         by_odds = (by_odds * odds_here / share).min(1.0);
         u = ((u - start + UNIT_STEP * unit_interval(bits)) / share).min(BELOW_ONE);
@@ -135,26 +139,32 @@ pub struct Choice {
     pub rest: u32,
     /// The probability of the choice; 0 if no light can bring anything.
     pub probability: f32,
+    /// The key light among those that were considered.
+    pub key: KeyLight,
 }
 
 /// The light that `word` chooses, in a scene with a tree.
 pub fn choose_light(scene: &Scene, r: &Receiver, word: u32) -> Choice {
     let (hash, root, place) = (pcg(word), &scene.light_nodes[0], !word);
-    let (mut begin, mut chosen) = (0, Choice { light: 0, rest: word, probability: 0.0 });
+    let (mut begin, mut chosen) = (0, Choice { light: 0, rest: word, probability: 0.0, key: KeyLight::NONE });
     for outside in &scene.light_nodes[1..root.child as usize] {
         let words = ((outside.power.min(BELOW_ONE) * 4294967296.0) as u32).min(!begin);
         if words > 0 && place >= begin {
             let rest = word_of_unit(((place - begin) as f32 + unit_interval(hash)) / words as f32, hash);
             let probability = words as f32 * WORD;
-            chosen = Choice { light: outside.child & !LIGHT_LEAF, rest, probability };
+            chosen = Choice { light: outside.child & !LIGHT_LEAF, rest, probability, ..chosen };
         }
         begin += words;
+        let beside = outside.child & !LIGHT_LEAF;
+        if scene.lights[beside as usize].kind == LIGHT_DIRECTIONAL {
+            chosen.key.consider(beside, words as f32 * WORD);
+        }
     }
     if root.power > 0.0 && place >= begin {
         let u = unit_interval(word) + UNIT_STEP * unit_interval(hash);
         let by_tree = if begin > 0 { begin.wrapping_neg() as f32 * WORD } else { root.power };
-        let (light, probability) = choose_by_tree(scene, r, (u / by_tree).min(BELOW_ONE), pcg(hash));
-        return Choice { light, rest: word, probability: by_tree * probability };
+        let choice = Choice { rest: word, probability: by_tree, ..chosen };
+        return choose_by_tree(scene, r, (u / by_tree).min(BELOW_ONE), pcg(hash), choice);
     }
     chosen
 }

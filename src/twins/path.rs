@@ -3,7 +3,6 @@ use crate::layout::{
     BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, FrameConstants, MATERIAL_EMITS_BEHIND, NONE, PathConstants, SurfacePoint,
 };
 use crate::scene::Scene;
-use crate::shaders::shared::light::SHARP_PROBABILITY;
 use crate::shaders::shared::path_step::{
     LEAST_REST, MAX_SURVIVAL, ODDS_BEYOND_COSINE, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE,
     PAIRS_PER_BOUNCE,
@@ -36,6 +35,8 @@ pub struct PathSample {
     pub albedo: Vec3,
     /// Whether smooth surfaces sent it a way that few paths take: that albedo is not what the pixel shows.
     pub astray: bool,
+    /// Whether it chose another light than the key light, if there is one.
+    pub passed_over: bool,
     /// What the light that was chosen at the first surface that is not smooth brings there, times the probability of that choice, if it has
     /// no extent.
     pub certain: Vec3,
@@ -81,14 +82,15 @@ struct SampledLight {
     sharp: f32,
     /// Index of the light.
     chosen: u32,
+    /// That of the key light.
+    key: u32,
 }
 
 /// As `kind_of_light` of the kernel.
-fn kind_of_light(seen: &Seen, sharp: bool) -> Kind {
+fn kind_of_light(seen: &Seen) -> Kind {
     match seen.scattered {
         0 if seen.share < 1.0 => Kind::Soft,
         0 => Kind::Direct,
-        1 if sharp => Kind::Direct,
         1 => Kind::Soft,
         _ => Kind::Indirect,
     }
@@ -235,7 +237,7 @@ impl Tracer<'_> {
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
         let light =
             light_sample(self.scene, &receiver_of(s, &p.bsdf, &p.view), word, sample_2d(random, p.pair + PAIR_LIGHT));
-        let none = SampledLight { brought: None, sharp: light.sharp, chosen: light.chosen };
+        let none = SampledLight { brought: None, sharp: light.sharp, chosen: light.chosen, key: light.key };
         if light.radiance == Vec3::ZERO {
             return none;
         }
@@ -298,7 +300,7 @@ impl Tracer<'_> {
     /// `first` is what the path's first ray finds. A path that is `sharp_only` ends where only light can come that a filter takes.
     fn trace_path(&self, mut path: Path, sharp_only: bool, first: Hit, random: Sampler, seed: u32) -> PathSample {
         let (mut sum, mut rays, mut seen) = (Sum::default(), 0, Seen { scattered: 0, share: 1.0, albedo: Vec3::ZERO });
-        let (mut certain, mut choice) = (Vec3::ZERO, NONE);
+        let (mut certain, mut choice, mut passed_over) = (Vec3::ZERO, NONE, false);
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
@@ -308,7 +310,7 @@ impl Tracer<'_> {
                 0 => first,
                 _ => traverse_from(self.scene, from, path.origin, path.direction, on_way),
             };
-            let kind = kind_of_light(&seen, false);
+            let kind = kind_of_light(&seen);
             if !hit.any() {
                 self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), kind);
                 break;
@@ -325,13 +327,16 @@ impl Tracer<'_> {
             let soft = self.effects.soft_light;
             let ends = sharp_only && seen.scattered > u32::from(!soft);
             if self.frame.path.light_count > 0 && !smooth_here {
-                let SampledLight { brought, sharp, chosen } =
+                let SampledLight { brought, sharp, chosen, key } =
                     self.light_from_nee(&p, random, mask_seed(seed, 2 * bounce + 1));
-                let is_sharp = sharp >= SHARP_PROBABILITY;
-                let brought = brought.filter(|_| !ends || (soft && is_sharp));
+                let (is_key, first) = (soft && chosen == key, seen.scattered == 1);
+                let brought = brought.filter(|_| !ends || is_key);
                 rays += u32::from(brought.is_some());
                 let light = path.throughput * brought.unwrap_or_default();
-                self.add_light(&mut sum, light, kind_of_light(&seen, is_sharp));
+                let kept = if is_key && first { sharp } else { 0.0 };
+                self.add_light(&mut sum, kept * light, Kind::Direct);
+                self.add_light(&mut sum, (1.0 - kept) * light, kind_of_light(&seen));
+                passed_over |= first && soft && key != NONE && !is_key;
                 if seen.scattered == 1 && choice == NONE && seen.share == 1.0 {
                     (certain, choice) = (sharp * light, chosen);
                 }
@@ -350,6 +355,7 @@ impl Tracer<'_> {
             indirect: if sharp_only { Vec3::ZERO } else { filtered },
             albedo: seen.albedo,
             astray: seen.share == 0.0,
+            passed_over,
             certain,
             choice,
             rays,

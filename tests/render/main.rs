@@ -9,6 +9,7 @@ mod glazed;
 #[allow(dead_code)]
 #[path = "../support/gltf.rs"]
 mod gltf_file;
+mod key;
 mod lens;
 #[path = "../support/moving.rs"]
 mod moving;

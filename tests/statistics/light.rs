@@ -1,13 +1,15 @@
 //! Statistics of light sampling on its CPU twin: directions follow the densities by which MIS weighs the same light when a bounce
 //! finds it.
 use crate::statistics::{chi_square, sidak};
-use crate::twin::{Random, Workplace, many_lamps};
+use crate::twin::{Random, Workplace, many_lamps, many_lamps_and};
 use glam::{Mat3, Vec3, dvec3, vec3};
 use std::f64::consts::{PI, TAU};
-use tallow::layout::{LIGHT_ENVIRONMENT, LIGHT_LEAF, LIGHT_POINT, Light, MATERIAL_EMITS_BEHIND, NONE};
+use tallow::layout::{
+    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_LEAF, LIGHT_POINT, Light, MATERIAL_EMITS_BEHIND, NONE,
+};
 use tallow::math::hash::{pcg, unit_interval};
 use tallow::scene::Loaded;
-use tallow::shaders::shared::light::EVEN_SHARE;
+use tallow::shaders::shared::light::{EVEN_SHARE, KEY_PROBABILITY};
 use tallow::shaders::shared::light_tree::CHILDREN;
 use tallow::twins::light::*;
 use tallow::twins::light_tree::{Choice, brought_by, choose_by_tree, choose_light};
@@ -271,7 +273,7 @@ fn a_tree_draws_lights_with_their_probabilities() {
             claimed.iter().enumerate().for_each(|(i, p)| expected[i / alike] += p * f64::from(WORDS));
             let whole = observed.len() - 1;
             for word in words() {
-                let (light, p) = choose_by_tree(&scene, &r, unit_interval(word), pcg(word));
+                let (light, p) = by_tree_alone(&scene, &r, unit_interval(word), pcg(word));
                 let expected = if p > 0.0 { claimed[light as usize] } else { 0.0 };
                 assert!(
                     (f64::from(p) - expected).abs() <= 1e-4 * expected,
@@ -292,6 +294,55 @@ fn a_tree_draws_lights_with_their_probabilities() {
     }
 }
 
+/// The light that the tree chooses where nothing lies beside it, and its probability.
+fn by_tree_alone(scene: &Loaded, r: &Receiver, u: f32, bits: u32) -> (u32, f32) {
+    let all = Choice { light: 0, rest: 0, probability: 1.0, key: KeyLight::NONE };
+    let choice = choose_by_tree(scene, r, u, bits, all);
+    (choice.light, choice.probability)
+}
+
+/// The key light of a place is the same however the choice falls, and the light without extent that it falls on most often.
+#[test]
+fn the_key_light_is_the_one_that_is_chosen_most_often() {
+    let bulb = "[[light]]\ntype = 'point'\nposition = [0.3, 0.9, 0.1]\nintensity = 1.0\n";
+    let sun = |irradiance: f32| {
+        format!("[[light]]\ntype = 'directional'\ndirection = [0.5, -1.0, 0.2]\nirradiance = {irradiance}\n")
+    };
+    let alone = Workplace::new().scene(&format!("[environment]\nradiance = 0.1\n{bulb}{}", sun(0.2)));
+    let (mut of_kinds, mut without) = ([0; 8], 0);
+    for scene in [
+        many_lamps(3),
+        many_lamps(40),
+        many_lamps_and(3, bulb),
+        many_lamps_and(40, bulb),
+        many_lamps_and(3, &sun(4.0)),
+        many_lamps_and(40, &sun(4.0)),
+        alone,
+    ] {
+        for r in receivers() {
+            let (mut chosen, mut keys) = (vec![0.0; scene.lights.len()], Vec::new());
+            for i in 0..1 << 14 {
+                let s = sampler_start(0, i, 1, false);
+                let light = light_sample(&scene, &r, sample_2d_bits(s, 0)[0], sample_2d(s, 1));
+                chosen[light.chosen as usize] += 1.0 / f32::from(1_u16 << 14);
+                keys.push(light.key);
+            }
+            let likeliest = (0..scene.lights.len()).filter(|&i| scene.lights[i].is_delta());
+            let likeliest = likeliest.max_by(|&a, &b| chosen[a].total_cmp(&chosen[b])).unwrap();
+            let share = chosen[likeliest];
+            assert!((share - KEY_PROBABILITY).abs() > 0.01, "control: {share} decides nothing");
+            let expected = if share > KEY_PROBABILITY { likeliest as u32 } else { NONE };
+            assert!(keys.iter().all(|&key| key == expected), "{share}: {expected}, but {:?}", keys[0]);
+            match share > KEY_PROBABILITY {
+                true => of_kinds[scene.lights[likeliest].kind as usize] += 1,
+                false => without += 1,
+            }
+        }
+    }
+    let seen = [LIGHT_POINT, LIGHT_DIRECTIONAL].map(|kind| of_kinds[kind as usize]);
+    assert!(seen.iter().all(|&n| n > 3) && without > 3, "control: {of_kinds:?}, {without}");
+}
+
 fn corners(i: u32, size: Vec3) -> [Vec3; 3] {
     let mut random = Random::stream(i as usize);
     let middle = size * random.point() + 2.0 * Vec3::Y;
@@ -305,7 +356,7 @@ fn trees_pass_over_lights_behind_a_surface_and_not_behind_glass() {
     let above = Receiver { position: vec3(0.3, highest + 1.0, 0.2), ..receivers()[0] };
     let chance = |r: &Receiver| by_tree(&scene, r).iter().sum::<f64>();
     assert_eq!(chance(&above), 0.0);
-    assert_eq!(choose_by_tree(&scene, &above, 0.5, 1).1, 0.0);
+    assert_eq!(by_tree_alone(&scene, &above, 0.5, 1).1, 0.0);
     assert!(chance(&Receiver { lets_light_through: true, ..above }) > 0.9, "glass");
     assert!(chance(&Receiver { normal: -Vec3::Y, ..above }) > 0.9, "control: turned round");
     assert_eq!(light_sample(&scene, &above, 1 << 20, glam::Vec2::splat(0.5)).radiance, Vec3::ZERO);

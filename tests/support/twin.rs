@@ -205,6 +205,11 @@ pub fn mean(scene: &Loaded, strategy: Strategy, samples: u32) -> Estimate {
 
 /// A gallery of small lamps of all kinds, a few of which matter to each place, below a dim sky, and as many `points` of light.
 pub fn many_lamps(points: usize) -> Loaded {
+    many_lamps_and(points, "")
+}
+
+/// The same, and what the tables `more` say.
+pub fn many_lamps_and(points: usize, more: &str) -> Loaded {
     let mut random = Random::new(11);
     let mut place = Workplace::new();
     let mut text = "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [-4.5, 0.8, 0.0]\ntarget = [-3.2, 0.0, 0.0]\nfov = 40.0\n\
@@ -237,7 +242,7 @@ pub fn many_lamps(points: usize) -> Loaded {
             ),
         };
     }
-    place.scene(&text)
+    place.scene(&(text + more))
 }
 
 /// A square whose corners have colours and opacities of their own.

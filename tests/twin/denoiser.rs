@@ -16,6 +16,7 @@ use tallow::layout::{Guide, NONE, PixelLight, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::Scene;
+use tallow::shaders::shared::sample_marks::ALL_PASSED_OVER;
 use tallow::statistics::{Pixel, variance_of_mean};
 
 const SIZES: [[u32; 2]; 6] = [[1, 1], [31, 1], [1, 65], [64, 2], [65, 3], LARGEST];
@@ -44,6 +45,8 @@ impl Frame {
                 PixelLight { direct: [unit(3); 3], indirect_m2: 2.0 * unit(7), albedo, ..PixelLight::default() };
             if is_lamp {
                 light = PixelLight { direct: [20.0; 3], ..PixelLight::default() };
+            } else if i % 11 == 4 {
+                light = PixelLight { direct: [0.0; 3], remainder: ALL_PASSED_OVER, ..light };
             }
             let mut mean: vec3 = std::array::from_fn(|c| light.direct[c] + light.albedo[c] * indirect[c]);
             // Unit but for rounding, as those of a render.
@@ -87,6 +90,7 @@ impl Frame {
         add("albedo", |f, i| if f.stats[i].count > 0 { f.light[i].albedo } else { f.guide[i].albedo });
         add("N", |f, i| f.guide[i].normal);
         add("P", |f, i| f.guide[i].position);
+        film.add("light.remainder", Samples::U32(self.light.iter().map(|l| l.remainder).collect()));
         film.add("indirect.m2", Samples::F32(self.light.iter().map(|l| l.indirect_m2).collect()));
         if !self.blur.is_empty() {
             film.add("denoising blur", Samples::F32(self.blur.clone()));

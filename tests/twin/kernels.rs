@@ -3,8 +3,8 @@
 use crate::support::kernels::{accumulate as fold_kernel, traverse as traverse_kernel};
 use crate::support::{self, assert_silent, gpu};
 use crate::twin::{
-    Aim, BALL, MIRRORS, PATTERNS, Random, Workplace, aimed_at_seam, ball, instanced_ball, many_lamps, patterned_lamp,
-    under_a_panel,
+    Aim, BALL, MIRRORS, PATTERNS, Random, Workplace, aimed_at_seam, ball, instanced_ball, many_lamps_and,
+    patterned_lamp, under_a_panel,
 };
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
@@ -15,8 +15,9 @@ use tallow::render::settings::{PixelFilter, Settings, Split};
 use tallow::render::{Batch, DeviceScene, Outputs, Renderer, Step, all_effects, called_for, frame_constants};
 use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
+use tallow::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, ASTRAY, PASSED_OVER};
 use tallow::twins::accumulate::fold;
-use tallow::twins::path::{Strategy, Tracer};
+use tallow::twins::path::{PathSample, Strategy, Tracer};
 use tallow::twins::primary_hit::{guide, seen, through_lens};
 use tallow::twins::texture::mask_bits;
 use tallow::twins::traverse::traverse;
@@ -137,9 +138,13 @@ pub struct Pair {
     light: [Vec<PixelLight>; 2],
 }
 
-/// The albedo of a sample, or what cannot be one where its path went a way that few take.
-fn marked(albedo: Vec3, astray: bool) -> Vec3 {
-    albedo - if astray { 4.0 } else { 0.0 }
+/// The albedo of a sample, or what cannot be one where it has `marks`: those of `glsl/shared/sample_marks.glsl`.
+fn marked(albedo: Vec3, marks: u32) -> Vec3 {
+    albedo - 4.0 * marks as f32
+}
+
+fn marks(sample: &PathSample) -> u32 {
+    u32::from(sample.astray) * ASTRAY | u32::from(sample.passed_over) * PASSED_OVER
 }
 
 /// Direct light, indirect light and albedo of the twin's samples one after the other, and the rays that it traced.
@@ -148,7 +153,7 @@ pub fn twin_samples(scene: &Loaded, effects: Effects) -> (Vec<Vec3>, u32) {
     let (tracer, pixels) = (Tracer { scene, frame, effects, strategy: Strategy::Both }, SIDE * SIDE);
     let sample = |i: u32| tracer.sample(i % pixels, i / pixels);
     let samples: Vec<_> = (0..pixels * SAMPLES).into_par_iter().map(sample).collect();
-    let all = samples.iter().flat_map(|s| [s.direct, s.indirect, marked(s.albedo, s.astray)]).collect();
+    let all = samples.iter().flat_map(|s| [s.direct, s.indirect, marked(s.albedo, marks(s))]).collect();
     (all, samples.iter().map(|s| s.rays).sum())
 }
 
@@ -169,7 +174,7 @@ pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
     let words = film.samples.read().unwrap();
     let tile = &film.tiles[0];
     let words = &words[..3 * (pixels * SAMPLES) as usize];
-    let read = |(i, &v): (usize, &vec4)| marked(Vec4::from(v).truncate(), i % 3 == 2 && v[3] == 1.0);
+    let read = |(i, &v): (usize, &vec4)| marked(Vec4::from(v).truncate(), if i % 3 == 2 { v[3] as u32 } else { 0 });
     let device: Vec<_> = words.iter().enumerate().map(read).collect();
     let rays: f32 = words.iter().step_by(3).map(|v| v[3]).sum();
 
@@ -272,11 +277,17 @@ fn renders_agree_with_their_twins() {
     check("wide sky", &run(&gpu, &sky, called_for(&sky, &sky.settings, outputs)));
     let mut panel = under_a_panel();
     small(&mut panel.settings);
-    for points in [3, 40] {
-        let mut lamps = many_lamps(points);
+    // A bulb that is the key light of what is near it, and a sun that is that of the rest.
+    let bulb = "[[light]]\ntype = 'point'\nposition = [-3.2, 0.9, 0.0]\nintensity = 20.0\n";
+    let sun = "[[light]]\ntype = 'directional'\ndirection = [0.5, -1.0, 0.2]\nirradiance = 1.6\n";
+    for (points, more) in [(3, [bulb, sun].concat()), (40, bulb.to_owned())] {
+        let mut lamps = many_lamps_and(points, &more);
         small(&mut lamps.settings);
         assert!(lamps.has_light_tree() && lamps.weighed_lights == (points < 33));
-        check("many lamps", &run(&gpu, &lamps, called_for(&lamps, &lamps.settings, outputs)));
+        let pair = run(&gpu, &lamps, called_for(&lamps, &lamps.settings, outputs));
+        check("many lamps", &pair);
+        let of_others = pair.samples[0].iter().filter(|v| v.max_element() < -4.0 * ASTRAY as f32).count();
+        assert!(of_others > 200, "control: {of_others} samples pass over the key light");
     }
     check("panel", &run(&gpu, &panel, called_for(&panel, &panel.settings, outputs)));
     let balls = spheres();
@@ -334,7 +345,13 @@ fn repeated(pixel: u32, k: u32) -> [vec4; 3] {
 
 /// Statistics after `times` times all repeated samples, in batches of `depth` samples a pixel.
 fn folded(gpu: &Gpu, samples: &[vec4], depth: u32, times: u32) -> (Vec<PixelStats>, Vec<PixelLight>) {
-    let effects = Effects { split_light: true, many_samples: true, smooth_interface: true, ..Effects::default() };
+    let effects = Effects {
+        split_light: true,
+        many_samples: true,
+        smooth_interface: true,
+        soft_light: true,
+        ..Effects::default()
+    };
     let thread = gpu.tuning().thread();
     let kernel = Kernel::new(gpu, &fold_kernel::Constants { effects, thread }).unwrap();
     let stats = Buffer::from_slice(gpu, "stats", &[PixelStats::default(); REPEATED as usize]).unwrap();
@@ -366,14 +383,16 @@ fn exact(samples: &[vec4], pixel: u32, of: impl Fn(&[vec4]) -> f64) -> f64 {
     own.map(of).sum::<f64>() / f64::from(PERIOD)
 }
 
-/// Of eight pixels one has samples that all went astray, one no such sample, the others some, first, between or last.
+/// Of eight pixels one has samples that all have a mark, one no such sample, the others some, first, between or last.
 #[test]
-fn ways_that_few_samples_take_are_folded_as_by_the_twin() {
+fn marked_samples_are_folded_as_by_the_twin() {
     let gpu = gpu();
-    const ASTRAY: [u8; REPEATED as usize] = [0b1111, 0, 1, 0b11, 0b1000, 0b1010, 0b0111, 0b110];
+    const MARKED: [u32; REPEATED as usize] = [0b1111, 0, 1, 0b11, 0b1000, 0b1010, 0b0111, 0b110];
     let sample = |k: u32, pixel: u32| {
         let mut sample = repeated(pixel, k);
-        sample[2][3] = f32::from(ASTRAY[pixel as usize] >> k & 1);
+        // The next pixel's samples pass over the key light.
+        let [astray, passed_over] = [pixel, (pixel + 1) % REPEATED].map(|p| MARKED[p as usize] >> k & 1);
+        sample[2][3] = (astray * ASTRAY | passed_over * PASSED_OVER) as f32;
         sample
     };
     let samples: Vec<vec4> = (0..4).flat_map(|k| (0..REPEATED).flat_map(move |pixel| sample(k, pixel))).collect();
@@ -383,11 +402,16 @@ fn ways_that_few_samples_take_are_folded_as_by_the_twin() {
     for depth in [1, 3, 4] {
         let (_, found) = folded(&gpu, &samples, depth, 1);
         for (pixel, (a, b)) in found.iter().zip(&light).enumerate() {
-            assert!(near(a.albedo, b.albedo, 1e-6) && a.remainder == b.remainder, "{depth}, {pixel}: {a:?}, {b:?}");
+            let alike = near(a.albedo, b.albedo, 1e-6) && near(a.direct, b.direct, 1e-6) && a.remainder == b.remainder;
+            let squares = (a.indirect_m2 - b.indirect_m2).abs() <= 1e-5 * b.indirect_m2;
+            assert!(alike && squares, "{depth}, {pixel}: {a:?}, {b:?}");
         }
     }
-    let alone: Vec<_> = light.iter().map(|l| l.remainder != 0).collect();
-    assert_eq!(alone, ASTRAY.map(|bits| bits == 0b1111), "control");
+    let all = |mark: u32| light.iter().map(move |l| l.remainder & mark != 0).collect::<Vec<_>>();
+    let mut marked = MARKED.map(|bits| bits == 0b1111);
+    assert_eq!(all(ALL_ASTRAY), marked, "control");
+    marked.rotate_left(1);
+    assert_eq!(all(ALL_PASSED_OVER), marked, "control");
     assert_silent(&gpu);
 }
 

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Location};
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats};
-use crate::render::film::{ALBEDO, BLUR, INDIRECT_M2, INDIRECT_STRIDE, SHARP_DIRECT};
+use crate::render::film::{ALBEDO, BLUR, INDIRECT_M2, INDIRECT_STRIDE, LIGHT_REMAINDER, SHARP_DIRECT};
 use bytemuck::Pod;
 use glam::Vec3;
 use places::Places;
@@ -113,6 +113,7 @@ impl<'a> Layers<'a> {
             direct: at(Aov::Direct),
             indirect_m2: self.indirect_m2.map_or(0.0, |m2| m2[i]),
             albedo: self.albedo(i),
+            remainder: self.aovs.film.words(LIGHT_REMAINDER).map_or(0, |w| w[i]),
             ..Default::default()
         }
     }

@@ -1,0 +1,100 @@
+//! Tests that the light of the key light is kept apart without the noise of the choice among lights.
+use crate::support::{self, assert_silent, gpu};
+use std::f32::consts::PI;
+use std::path::Path;
+use tallow::denoise::filter::{Method, find};
+use tallow::denoise::{Filtered, Noisy, Recipe};
+use tallow::gpu::Gpu;
+use tallow::layout::{Guide, PixelLight};
+use tallow::render::{Outputs, Renderer};
+use tallow::scene::{Loaded, Scene};
+use tallow::shaders::shared::sample_marks::ALL_PASSED_OVER;
+
+const ALBEDO: f32 = 0.5;
+/// Place and intensity of two bulbs above a floor.
+const BULBS: [([f32; 3], f32); 2] = [([-0.8, 0.8, 0.0], 1.0), ([0.8, 0.8, 0.2], 2.0)];
+
+fn two_bulbs(spp: u32) -> Loaded {
+    let mut text = format!(
+        "[film]\nwidth = 40\nheight = 31\n[camera]\nposition = [0.0, 3.0, 0.5]\ntarget = [0.0, 0.0, 0.0]\nfov = 50.0\n\
+         [render]\nspp = {spp}\nmax_depth = 2\n[[material]]\nname = 'floor'\ncolor = {ALBEDO}\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'floor'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 9.0 }}\n"
+    );
+    for (position, intensity) in BULBS {
+        text += &format!("[[light]]\ntype = 'point'\nposition = {position:?}\nintensity = {intensity}\n");
+    }
+    Scene::parse(Path::new("bulbs.toml"), &text).unwrap()
+}
+
+/// What each bulb brings to the camera from a point of the floor, albedo / pi times intensity times cosine over squared distance; the
+/// stronger one first.
+fn brought(at: &Guide) -> [f32; 2] {
+    let [x, _, z] = at.position;
+    let mut each = BULBS.map(|([px, height, pz], intensity)| {
+        let d2 = (x - px).powi(2) + height * height + (z - pz).powi(2);
+        ALBEDO / PI * intensity * height / d2.powf(1.5)
+    });
+    each.sort_by(|a, b| b.total_cmp(a));
+    each
+}
+
+/// A render of so many samples: its light and guides, and what `auto` makes of it.
+fn rendered(gpu: &Gpu, spp: u32) -> (Vec<PixelLight>, Vec<Guide>, Vec<f32>) {
+    let scene = two_bulbs(spp);
+    let renderer = Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    support::render(gpu, &renderer);
+    let tile = &renderer.film().tiles[0];
+    let recipe = Recipe::new(Method::Kernels(find("auto").unwrap()));
+    let clean = Filtered::new(gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap().join(gpu).unwrap();
+    (tile.light.read().unwrap(), tile.guide.read().unwrap(), clean.colour[1].clone())
+}
+
+/// Of two bulbs the stronger one at a place is chosen in proportion to what it brings, and so seldom as half of the time: direct light is
+/// what it brings, but for the spread of the samples over the pixel, wherever the other one is clearly weaker.
+#[test]
+fn key_light_has_no_noise_of_the_choice_of_lights() {
+    let gpu = gpu();
+    let (light, guide, _) = rendered(&gpu, 4);
+    let mut compared = 0;
+    for (l, at) in light.iter().zip(&guide) {
+        let [key, other] = brought(at);
+        if key > 1.3 * other {
+            let off = l.direct[0] / key - 1.0;
+            assert!(
+                off.abs() < 0.12 && l.remainder == 0,
+                "{off} at {:?}, where the other has {}",
+                at.position,
+                other / key
+            );
+            compared += 1;
+        }
+    }
+    assert!(compared > 900, "control: {compared} pixels");
+    // Of one sample, those that chose the other bulb know nothing.
+    let (light, guide, _) = rendered(&gpu, 1);
+    let passed_over = |l: &PixelLight| l.remainder == ALL_PASSED_OVER;
+    let share = light.iter().filter(|l| passed_over(l)).count() as f32 / light.len() as f32;
+    let weaker = |at: &Guide| {
+        let [key, other] = brought(at);
+        0.95 * other / (key + other) + 0.025
+    };
+    let expected = guide.iter().map(weaker).sum::<f32>() / guide.len() as f32;
+    assert!((share - expected).abs() < 0.03, "{share} of the pixels pass over the key light, expected are {expected}");
+    assert!(light.iter().all(|l| !passed_over(l) || l.direct == [0.0; 3]));
+    assert_silent(&gpu);
+}
+
+/// Both bulbs light the floor everywhere, so that all light has the noise of an even share of the choices alone, which a filter takes. What
+/// is kept from it had the noise of all choices, whose grain and rings showed on smooth floors.
+#[test]
+fn floors_that_bulbs_light_have_no_grain_behind_a_filter() {
+    let gpu = gpu();
+    for (spp, most) in [(1, 0.05), (4, 0.02)] {
+        let (_, guide, clean) = rendered(&gpu, spp);
+        let off = |(c, at): (&f32, &Guide)| (c / brought(at).iter().sum::<f32>() - 1.0).powi(2);
+        let error = (clean.iter().zip(&guide).map(off).sum::<f32>() / clean.len() as f32).sqrt();
+        println!("{spp}: {error}");
+        assert!(error < most, "{spp} samples: {error}");
+    }
+    assert_silent(&gpu);
+}
