@@ -54,7 +54,7 @@ pub fn sample_2d_bits(s: Sampler, pair: u32) -> [u32; 2] {
 
 /// Two numbers in [0, 1), from the upper 24 bits of each word.
 pub fn unit_floats(bits: [u32; 2]) -> Vec2 {
-    Vec2::from_array(bits.map(unit_interval))
+    Vec2::new(unit_interval(bits[0]), unit_interval(bits[1]))
 }
 
 /// Two numbers in [0, 1).

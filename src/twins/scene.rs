@@ -3,7 +3,7 @@ use crate::layout::{Instance, NONE};
 use crate::scene::Scene;
 use crate::scene::lookup::triangle_coordinates;
 use crate::twins::sphere::Sphere;
-use glam::{Mat3, Vec2, Vec3, Vec4};
+use glam::{Mat3, Vec2, Vec3, Vec4, vec3};
 
 /// Three rows that take a point (x, y, z, 1), as GLSL's mat4x3 does.
 #[derive(Clone, Copy, Debug)]
@@ -12,12 +12,14 @@ pub struct Rows([Vec4; 3]);
 impl Rows {
     /// Transforms a point.
     pub fn point(&self, p: Vec3) -> Vec3 {
-        Vec3::from(self.0.map(|r| r.x * p.x + r.y * p.y + r.z * p.z + r.w))
+        let row = |r: Vec4| r.x * p.x + r.y * p.y + r.z * p.z + r.w;
+        vec3(row(self.0[0]), row(self.0[1]), row(self.0[2]))
     }
 
     /// Transforms a direction.
     pub fn vector(&self, v: Vec3) -> Vec3 {
-        Vec3::from(self.0.map(|r| r.x * v.x + r.y * v.y + r.z * v.z))
+        let row = |r: Vec4| r.x * v.x + r.y * v.y + r.z * v.z;
+        vec3(row(self.0[0]), row(self.0[1]), row(self.0[2]))
     }
 
     /// The sum of the magnitudes that are added up for a point of coordinates up to `p`.
@@ -33,18 +35,18 @@ impl Rows {
 
 /// Transform from object to world space.
 pub fn world_from_object(i: &Instance) -> Rows {
-    Rows([i.world0, i.world1, i.world2].map(Vec4::from))
+    Rows([i.world0.into(), i.world1.into(), i.world2.into()])
 }
 
 /// Transform from world to object space.
 pub fn object_from_world(i: &Instance) -> Rows {
-    Rows([i.object0, i.object1, i.object2].map(Vec4::from))
+    Rows([i.object0.into(), i.object1.into(), i.object2.into()])
 }
 
 /// Corners of a triangle in object space (world space without instances).
 pub fn triangle_vertices(scene: &Scene, triangle: u32) -> [Vec3; 3] {
     let t = &scene.triangles[triangle as usize];
-    [t.v0, t.v1, t.v2].map(Vec3::from)
+    [t.v0.into(), t.v1.into(), t.v2.into()]
 }
 
 /// Material of a triangle, which its instance may replace.

@@ -55,12 +55,13 @@ impl RaySpace {
 
 /// Prepares a ray, whose `direction` may have any length but 0.
 pub fn ray_space(origin: Vec3, direction: Vec3) -> RaySpace {
-    let safe = direction.map(|d| if d.abs() < 1e-20 { 1e-20 } else { d });
+    let safe = |d: f32| if d.abs() < 1e-20 { 1e-20 } else { d };
+    let safe = vec3(safe(direction.x), safe(direction.y), safe(direction.z));
     let size = direction.abs();
     let along_x = size.x > size.y.max(size.z);
     let along_y = !along_x && size.y > size.z;
-    let positive = safe.to_array().map(|d| u32::from(d >= 0.0));
-    let octant = (positive[0] * 4 + positive[1] * 2 + positive[2]) * 0x01010101;
+    let positive = |d: f32| u32::from(d >= 0.0);
+    let octant = (positive(safe.x) * 4 + positive(safe.y) * 2 + positive(safe.z)) * 0x01010101;
     let mut r = RaySpace { origin, direction, inverse: 1.0 / safe, shear: Vec3::ZERO, along_x, along_y, octant };
     let along = r.largest_last(r.inverse).z;
     let d = r.largest_last(direction);
@@ -70,8 +71,11 @@ pub fn ray_space(origin: Vec3, direction: Vec3) -> RaySpace {
 
 /// Distance of the hit in lengths of the ray's direction, and barycentric weights; `None` at or beyond `t_max`.
 pub fn intersect_triangle(r: &RaySpace, vertices: [Vec3; 3], t_max: f32) -> Option<(f32, Vec2)> {
-    let [a, b, c] = vertices.map(|v| r.largest_last(v - r.origin));
-    let [p, q, s] = [a, b, c].map(|v| vec2(v.x - r.shear.x * v.z, v.y - r.shear.y * v.z));
+    // Written out, as below: builds that hardly optimise call functions for what `map` does, which took most of the time of tests.
+    let local = |v: Vec3| r.largest_last(v - r.origin);
+    let (a, b, c) = (local(vertices[0]), local(vertices[1]), local(vertices[2]));
+    let sheared = |v: Vec3| vec2(v.x - r.shear.x * v.z, v.y - r.shear.y * v.z);
+    let (p, q, s) = (sheared(a), sheared(b), sheared(c));
     let u = s.x * q.y - s.y * q.x;
     let v = p.x * s.y - p.y * s.x;
     let w = q.x * p.y - q.y * p.x;
@@ -113,10 +117,11 @@ fn intersect_children(
     let mut mask = 0;
     for i in [0, 8, 16, 24] {
         let plane = |q: u32| ((q >> i) & 0xff) as f32;
-        let planes = |q: [u32; 3]| (Vec3::from(q.map(plane)) * scale + origin).to_array().map(|t| t.to_bits() as i32);
+        let planes = |q: [u32; 3]| vec3(plane(q[0]), plane(q[1]), plane(q[2])) * scale + origin;
         let (t_near, t_far) = (planes(near), planes(far));
-        let enter = t_near.into_iter().fold(0, i32::max);
-        let leave = t_far.into_iter().fold(t_max.to_bits() as i32, i32::min);
+        let bits = |t: f32| t.to_bits() as i32;
+        let enter = bits(t_near.x).max(bits(t_near.y)).max(bits(t_near.z)).max(0);
+        let leave = bits(t_far.x).min(bits(t_far.y)).min(bits(t_far.z)).min(bits(t_max));
         if enter <= leave + SLAB_ROUNDING {
             mask |= ((child_bits >> i) & 0xff) << ((bit_index >> i) & 0xff);
         }
@@ -126,14 +131,16 @@ fn intersect_children(
 
 /// One bit per inner child hit (24 to 31, in order of visit) and one per triangle (0 to 23).
 fn intersect_node(r: &RaySpace, n: &BvhNode, t_max: f32) -> u32 {
-    let cell = Vec3::from([0, 8, 16].map(|i| f32::from_bits(((n.e_imask >> i) & 0xff) << 23)));
-    let scale = cell * r.inverse;
+    let cell = |i: u32| f32::from_bits(((n.e_imask >> i) & 0xff) << 23);
+    let scale = vec3(cell(0), cell(8), cell(16)) * r.inverse;
     let origin = (Vec3::from(n.p) - r.origin) * r.inverse;
-    let axes = [(n.min_x, n.max_x), (n.min_y, n.max_y), (n.min_z, n.max_z)];
-    let negative = r.inverse.to_array().map(|i| i < 0.0);
     let half = |h: usize| {
-        let near = [0, 1, 2].map(|i| if negative[i] { axes[i].1[h] } else { axes[i].0[h] });
-        let far = [0, 1, 2].map(|i| if negative[i] { axes[i].0[h] } else { axes[i].1[h] });
+        let (mut near, mut far) = ([n.min_x[h], n.min_y[h], n.min_z[h]], [n.max_x[h], n.max_y[h], n.max_z[h]]);
+        for axis in 0..3 {
+            if r.inverse[axis] < 0.0 {
+                std::mem::swap(&mut near[axis], &mut far[axis]);
+            }
+        }
         intersect_children(n.meta[h], r.octant, near, far, scale, origin, t_max)
     };
     half(0) | half(1)
