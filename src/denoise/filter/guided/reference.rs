@@ -52,12 +52,16 @@ impl<'a> Image<'a> {
     /// Sums over the window around a block.
     fn sums(&self, block: usize) -> Option<Sums> {
         let (size, step) = (self.size, self.step);
-        let pixels_of = |block: usize| {
+        let mut known = Vec::new();
+        for block in window(self.blocks, block, self.radius) {
             let corner = [block as u32 % self.blocks[0] * step, block as u32 / self.blocks[0] * step];
-            let [across, down] = [0, 1].map(|k| corner[k]..(corner[k] + step).min(size[k]));
-            down.flat_map(move |v| across.clone().map(move |u| (v * size[0] + u) as usize))
-        };
-        Sums::new(&self.pixels, window(self.blocks, block, self.radius).flat_map(pixels_of), self.eps)
+            let (left, right) = (corner[0], (corner[0] + step).min(size[0]));
+            for v in corner[1]..(corner[1] + step).min(size[1]) {
+                let row = &self.pixels[(v * size[0] + left) as usize..(v * size[0] + right) as usize];
+                known.extend(row.iter().filter_map(|pixel| pixel.colour.map(|colour| (colour, pixel.guide))));
+            }
+        }
+        Sums::new(&known, self.eps)
     }
 }
 
@@ -117,20 +121,23 @@ struct Sums {
 
 impl Sums {
     /// Of none where no pixel is known.
-    fn new(pixels: &[Pixel], window: impl Iterator<Item = usize>, eps: &vec4) -> Option<Self> {
-        let known: Vec<(DVec3, DVec4)> =
-            window.filter_map(|k| pixels[k].colour.map(|colour| (colour, pixels[k].guide))).collect();
+    fn new(known: &[(DVec3, DVec4)], eps: &vec4) -> Option<Self> {
         let (count, share) = (known.len() as f64, 1.0 / known.len().max(1) as f64);
         let mean = known.iter().map(|(c, _)| c * share).sum::<DVec3>();
         let mean_guide = known.iter().map(|(_, g)| g * share).sum::<DVec4>();
-        let (mut guide, mut colour) = ([[0.0; 4]; 4], [DVec4::ZERO; 3]);
-        for (c, g) in &known {
+        let (mut columns, mut colour) = ([DVec4::ZERO; 4], [DVec4::ZERO; 3]);
+        // Whole columns, written out: builds that hardly optimise take several times as long for numbers one by one.
+        for (c, g) in known {
             let (off, c) = (*g - mean_guide, *c - mean);
-            for i in 0..4 {
-                (0..4).for_each(|j| guide[i][j] += off[i] * off[j] * share);
-            }
-            (0..3).for_each(|i| colour[i] += off * c[i] * share);
+            columns[0] += off.x * off * share;
+            columns[1] += off.y * off * share;
+            columns[2] += off.z * off * share;
+            columns[3] += off.w * off * share;
+            colour[0] += off * c.x * share;
+            colour[1] += off * c.y * share;
+            colour[2] += off * c.z * share;
         }
+        let mut guide = columns.map(|column| column.to_array());
         (0..4).for_each(|i| guide[i][i] += f64::from(eps[i]));
         (count > 0.0).then_some(Self { count, mean, mean_guide, guide, colour })
     }
