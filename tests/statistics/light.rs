@@ -251,28 +251,27 @@ fn receivers() -> [Receiver; 4] {
     [floor, glossy, Receiver { lets_light_through: true, ..floor }, Receiver::point(HERE)]
 }
 
-const WORDS: u32 = 1 << 18;
-
-/// Words, each in its own part of all.
-fn words() -> impl Iterator<Item = u32> {
-    (0..WORDS).map(|i| i << 14 | pcg(i) >> 18)
+/// So many words, a power of two, each in its own part of all.
+fn words(count: u32) -> impl Iterator<Item = u32> {
+    let bits = count.ilog2();
+    (0..count).map(move |i| i << (32 - bits) | pcg(i) >> bits)
 }
 
 #[test]
 fn a_tree_draws_lights_with_their_probabilities() {
-    // Of a hundred thousand lamps each is drawn a few times alone, and steps down the tree use up the digits of a number.
+    // Of a hundred thousand lamps each is drawn alone about once, and steps down the tree use up the digits of a number.
     let crowd: Vec<_> = (0..100_000).map(|i| corners(i, vec3(30.0, 1.0, 30.0))).collect();
     let text = "[[material]]\nname = 'a'\nemission = 1.0\n[[mesh]]\nfile = 'crowd.obj'\nmaterial = 'a'\n";
     let crowd = Workplace::new().obj("crowd.obj", &crowd).scene(text);
-    for (name, scene, alike) in [("few", many_lamps(40), 1), ("crowd", crowd, 256)] {
+    for (name, scene, alike, count) in [("few", many_lamps(40), 1, 1 << 18), ("crowd", crowd, 256, 1 << 16)] {
         assert!(scene.has_light_tree(), "{name}");
         for r in receivers() {
             let claimed = by_tree(&scene, &r);
             let mut observed = vec![0.0; scene.lights.len().div_ceil(alike) + 1];
             let mut expected = observed.clone();
-            claimed.iter().enumerate().for_each(|(i, p)| expected[i / alike] += p * f64::from(WORDS));
+            claimed.iter().enumerate().for_each(|(i, p)| expected[i / alike] += p * f64::from(count));
             let whole = observed.len() - 1;
-            for word in words() {
+            for word in words(count) {
                 let (light, p) = by_tree_alone(&scene, &r, unit_interval(word), pcg(word));
                 let expected = if p > 0.0 { claimed[light as usize] } else { 0.0 };
                 assert!(
@@ -281,7 +280,7 @@ fn a_tree_draws_lights_with_their_probabilities() {
                 );
                 observed[if p > 0.0 { light as usize / alike } else { whole }] += 1.0;
             }
-            expected[whole] = (f64::from(WORDS) - expected.iter().sum::<f64>()).max(0.0);
+            expected[whole] = (f64::from(count) - expected.iter().sum::<f64>()).max(0.0);
             // Words are spread evenly, so that numbers of draws differ less from what is expected than by chance.
             let p = chi_square(&observed, &expected);
             assert!(p > sidak(8), "{name}, {r:?}: {p:.1e}");
@@ -442,6 +441,7 @@ fn what_is_left_of_a_choice_is_independent_of_it() {
 /// Large skies read all digits of the word that a choice leaves them: without one of them, every second of some texels is never drawn.
 #[test]
 fn a_sky_beside_a_tree_gets_a_word_of_even_digits() {
+    const WORDS: u32 = 1 << 18;
     let lamps: Vec<_> = (0..8).map(|i| corners(i, Vec3::ONE)).collect();
     for (emission, share) in [(1e6, 0.25), (1e-6, 0.5)] {
         let place = Workplace::new().obj("lamps.obj", &lamps).sky("sky.exr", 4, 2, |_, _| 1.0);
@@ -450,7 +450,7 @@ fn a_sky_beside_a_tree_gets_a_word_of_even_digits() {
              [[mesh]]\nfile = 'lamps.obj'\nmaterial = 'a'\n"
         ));
         assert!(scene.has_light_tree());
-        let choices = words().map(|word| choose_light(&scene, &receivers()[0], word));
+        let choices = words(WORDS).map(|word| choose_light(&scene, &receivers()[0], word));
         let is_sky = |choice: &Choice| scene.lights[choice.light as usize].kind == LIGHT_ENVIRONMENT;
         let rests: Vec<u32> = choices.filter(is_sky).map(|choice| choice.rest).collect();
         let drawn = rests.len() as f64 / f64::from(WORDS);

@@ -33,10 +33,9 @@ impl Grid {
         index(t, RINGS) * SECTORS + index(turn, SECTORS)
     }
 
-    /// wi for polar coordinates of the slope, and the solid angle per unit of (t, turn); None where no wi exists.
-    fn direction(&self, t: f64, turn: f64) -> Option<(Vec3, f64)> {
-        let radius = (t / (1.0 - t)).exp_m1();
-        let (sin, cos) = (TAU * turn).sin_cos();
+    /// wi for polar coordinates of the slope, where `radius` is that of t and (`sin`, `cos`) are of the turn, and the solid angle per unit
+    /// of (t, turn); None where no wi exists.
+    fn direction(&self, t: f64, radius: f64, (sin, cos): (f64, f64)) -> Option<(Vec3, f64)> {
         let side = self.wo.z.signum();
         let m = dvec3(radius * self.alpha.x * cos, radius * self.alpha.y * sin, 1.0).normalize() * side;
         let co = self.wo.dot(m);
@@ -56,10 +55,12 @@ impl Grid {
     pub fn integrate(&self, f: impl Fn(Vec3) -> f64) -> Vec<f64> {
         let mut cells = vec![0.0; RINGS * SECTORS];
         let (rings, sectors) = (RINGS * POINTS, SECTORS * POINTS);
+        let turns: Vec<_> = (0..sectors).map(|j| (TAU * ((j as f64 + 0.5) / sectors as f64)).sin_cos()).collect();
         for i in 0..rings {
-            for j in 0..sectors {
-                let (t, turn) = ((i as f64 + 0.5) / rings as f64, (j as f64 + 0.5) / sectors as f64);
-                if let Some((wi, area)) = self.direction(t, turn) {
+            let t = (i as f64 + 0.5) / rings as f64;
+            let radius = (t / (1.0 - t)).exp_m1();
+            for (j, turn) in turns.iter().enumerate() {
+                if let Some((wi, area)) = self.direction(t, radius, *turn) {
                     cells[i / POINTS * SECTORS + j / POINTS] += f(wi) * area / (rings * sectors) as f64;
                 }
             }
