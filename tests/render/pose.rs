@@ -5,7 +5,7 @@ use std::path::Path;
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Effects, PixelStats, Texture};
-use tallow::render::{Moves, Outputs, Renderer, Reproject, all_effects, called_for};
+use tallow::render::{Moves, Outputs, Renderer, Reproject, called_for};
 use tallow::scene::description::{LightTable, Rgb, Transform};
 use tallow::scene::{Change, Environment, EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
 
@@ -271,8 +271,8 @@ fn a_scene_that_needs_a_deeper_stack_is_told_what_to_do() {
     let text = "[film]\nwidth = 8\nheight = 8\n[environment]\nradiance = 1\n[[mesh]]\nshape = 'rectangle'\n";
     let (small, other) = (Scene::parse(Path::new("small.toml"), text).unwrap(), at(&Moment::default()));
     assert!(other.stack > small.stack, "control");
-    let effects = all_effects(&other, &small.settings);
-    let mut renderer = Renderer::specialised(&gpu, &small, &small.settings, OUTPUTS, effects).unwrap();
+    let [effects, own] = [&other, &small].map(|scene| called_for(scene, &small.settings, OUTPUTS));
+    let mut renderer = Renderer::specialised(&gpu, &small, &small.settings, OUTPUTS, effects.or(own)).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let told = gpu.run(&mut frame, |rec| renderer.update(rec, &other, &Change::everything(&other))).unwrap_err();
     let told = told.to_string();
