@@ -108,15 +108,16 @@ fn leaks(scene: &Loaded, count: usize, origin: impl Fn(&mut Random) -> Vec3 + Sy
 #[test]
 fn closed_meshes_do_not_leak() {
     let inside = |r: &mut Random| BALL + 0.5 * r.point();
-    for (mut scene, count) in [(ball(), 1_000_000), (instanced_ball(), 200_000)] {
-        assert_eq!(leaks(&scene, count, inside), 0, "from inside");
-        assert_eq!(leaks(&scene, count / 10, |_| BALL), 0, "from the centre, along the axes too");
+    for (mut scene, count) in [(ball(), 200_000), (instanced_ball(), 40_000)] {
+        // Of some 16,000 triangles each is aimed at 25 and 5 times.
+        assert_eq!(leaks(&scene, 2 * count, inside), 0, "from inside");
+        assert_eq!(leaks(&scene, count / 2, |_| BALL), 0, "from the centre, along the axes too");
 
         // Without the slack of the box test 14 of these pass; at 1000 radii, where rounding moves vertices and boxes
         // apart, 3 in a million do with it.
         for distance in [10.0, 100.0] {
             let afar = move |r: &mut Random| BALL + distance * r.point().normalize();
-            assert_eq!(leaks(&scene, count / 5, afar), 0, "from {distance} radii away");
+            assert_eq!(leaks(&scene, count, afar), 0, "from {distance} radii away");
         }
 
         let hole = scene.triangles[1234].v0;

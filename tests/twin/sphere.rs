@@ -124,7 +124,9 @@ fn spheres_are_what_fine_meshes_approach() {
                     continue;
                 }
                 let exact = placed(place, instance, more);
-                let mesh = placed(place, instance, &format!("{more}\nsegments = 512"));
+                // The last is the flattest, whose normals turn most from one facet to the next.
+                let segments = if i < PLACES.len() - 1 { 256 } else { 384 };
+                let mesh = placed(place, instance, &format!("{more}\nsegments = {segments}"));
                 assert_eq!(
                     (exact.triangles.len(), exact.instances.len()),
                     (1, usize::from(instance || i > 2)),
@@ -136,7 +138,7 @@ fn spheres_are_what_fine_meshes_approach() {
             }
         }
     }
-    let (mut mirrored, mesh) = (placed(PLACES[2], false, ""), placed(PLACES[2], false, "segments = 512"));
+    let (mut mirrored, mesh) = (placed(PLACES[2], false, ""), placed(PLACES[2], false, "segments = 256"));
     mirrored.triangles[0].primitive &= SPHERE;
     assert!(apart(&mirrored, &mesh)[3] > 0.5, "control: texture coordinates that are not mirrored");
 }
