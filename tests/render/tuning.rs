@@ -39,7 +39,7 @@ pub fn film(gpu: &Gpu, scene: &Loaded) -> ([Vec<u32>; 3], Counters) {
     ([bits(&stats), bits(&light), bits(&guide)], renderer.counters().unwrap())
 }
 
-fn filtered(gpu: &Gpu, scene: &Loaded) -> Vec<(&'static str, Vec<vec4>)> {
+fn filtered(gpu: &Gpu, scene: &Loaded, filters: impl Fn(&str) -> bool) -> Vec<(&'static str, Vec<vec4>)> {
     let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
     render(gpu, &renderer);
     let filter = |row: &&Row| {
@@ -49,7 +49,7 @@ fn filtered(gpu: &Gpu, scene: &Loaded) -> Vec<(&'static str, Vec<vec4>)> {
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
         (row.name, denoiser.picture().read().unwrap())
     };
-    FILTERS.iter().map(filter).collect()
+    FILTERS.iter().filter(|row| filters(row.name)).map(filter).collect()
 }
 
 #[test]
@@ -85,12 +85,19 @@ fn a_gpus_sizes_leave_the_bits_of_filters() {
     let scene = scene("cornell-box/scene.toml", "uniform");
     let of_windows = |windows| Tuning { windows, ..Tuning::GPU };
     let gpus = [Tuning::CPU, of_windows(0), Tuning::GPU, of_windows(1)].map(tuned_gpu);
-    let [cpu, same, others @ ..] = gpus.each_ref().map(|gpu| filtered(gpu, &scene));
+    let [cpu, same] = [0, 1].map(|i| filtered(&gpus[i], &scene, |_| true));
     for ((filter, cpu), (_, same)) in cpu.iter().zip(&same) {
         assert!(bits(cpu) == bits(same), "{filter}");
     }
-    for ((filter, cpu), (_, other)) in others.iter().flat_map(|other| cpu.iter().zip(other)) {
-        assert!(bits(cpu) == bits(other) || WINDOWED.contains(filter) && alike(cpu, other), "{filter}");
+    // Kernels of the others know nothing of windows: they are what they were. Those in `auto` are those of `guided`, which
+    // `windows_hold_however_threads_share_them` compares with its twin in any number.
+    for (gpu, windowed) in gpus[2..].iter().zip([&WINDOWED[..], &WINDOWED[..1]]) {
+        let others = filtered(gpu, &scene, |name| windowed.contains(&name));
+        assert_eq!(others.len(), windowed.len());
+        for (filter, other) in &others {
+            let (_, cpu) = cpu.iter().find(|(name, _)| name == filter).unwrap();
+            assert!(alike(cpu, other), "{filter}");
+        }
     }
     gpus.iter().for_each(assert_silent);
 }
@@ -101,7 +108,8 @@ fn workgroups_leave_the_bits_of_filters() {
     let scene = scene("cornell-box/scene.toml", "uniform").with(large);
     let [usual, others @ ..] = [32, 128, 256].map(|filter_workgroup| {
         let gpu = tuned_gpu(Tuning { filter_workgroup, ..Tuning::CPU });
-        let pictures = filtered(&gpu, &scene);
+        // Kernels of these two have workgroups of lines, or no pixels around their own.
+        let pictures = filtered(&gpu, &scene, |name| !["guided", "none"].contains(&name));
         assert_silent(&gpu);
         pictures
     });
