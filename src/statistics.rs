@@ -1,7 +1,7 @@
 //! The statistics of a pixel's samples, and how those of two disjoint sets of samples are combined.
 use crate::layout::{PixelLight, PixelStats, vec3};
 use crate::math::srgb::luminance;
-use crate::shaders::accumulate::MIN_ALBEDO;
+use crate::shaders::accumulate::{MIN_ALBEDO, ONE_SURFACE};
 use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ pub struct Pixel {
 
 impl Pixel {
     /// The light that needs a filter, before the reflectance that it has been multiplied by: radiance less direct light, over
-    /// albedo. 0 where there is none.
+    /// albedo. 0 where there is none, and below 0 where samples by chance bring less than direct light.
     pub fn indirect(&self) -> vec3 {
         let (Pixel { stats, light }, known) = (self, |v: f32| if v.is_finite() { v } else { 0.0 });
         std::array::from_fn(|c| known((stats.mean[c] - light.direct[c]) / light.albedo[c]))
@@ -103,7 +103,9 @@ fn is_all(p: &Pixel, mark: u32) -> bool {
 /// A part whose samples all passed over the key light, with the direct light of the other one, as `glsl/film/accumulate.comp` has it.
 fn with_key_light(part: &Pixel, other: &Pixel) -> Pixel {
     let mut part = *part;
-    if is_all(&part, ALL_PASSED_OVER) && !is_all(other, ALL_PASSED_OVER) {
+    let largest = |p: &Pixel| p.light.albedo.into_iter().fold(0.0, f32::max);
+    let one_surface = largest(other) > ONE_SURFACE * largest(&part);
+    if one_surface && is_all(&part, ALL_PASSED_OVER) && !is_all(other, ALL_PASSED_OVER) {
         let light = &mut part.light;
         light.direct =
             std::array::from_fn(|c| if light.albedo[c] > MIN_ALBEDO { other.light.direct[c] } else { light.direct[c] });

@@ -34,7 +34,7 @@ struct Surroundings {
 // sample has the colour of the pixel's mean. The covariance of direct and indirect light counts as direct.
 float indirect_squares(uint pixel, vec3 mean, float squares) {
     PixelLight l = PixelLight_load(light, pixel);
-    vec3 indirect = mean - l.direct;
+    vec3 indirect = abs(mean - l.direct); // a key light leaves negative light beside it
     float level = luminance(indirect);
     vec3 tint = level > 0.0 ? min(indirect / level, vec3(MAX_TINT)) : vec3(0.0);
     return min(l.indirect_m2 * dot(tint, tint) / 3.0, squares);

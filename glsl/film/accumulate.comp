@@ -1,6 +1,7 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/uint64.glsl"
+#include "shared/largest_channel.glsl"
 #include "shared/luminance.glsl"
 #include "shared/pcg.glsl"
 
@@ -93,14 +94,20 @@ vec3 albedo_along(inout PixelLight l, vec3 noted, uint marks, uint count) {
     return noted;
 }
 
+// Samples of a pixel show one surface where their albedo is at most so much larger than the mean of those before. A mean with sky or a lamp
+// in it, which have none, says nothing of a surface.
+const float ONE_SURFACE = 0.75;
+
 // The direct light of sample number `count`. One that passed over the key light counts as the mean of those before it, so that the mean has
-// no noise of that choice; or, if all before it did, as the first that does not. `whole` are channels that keep all of their light.
-vec3 direct_along(inout PixelLight l, vec3 direct, vec3 radiance, bvec3 whole, uint marks, uint count) {
+// no noise of that choice; or, if all before it did, as the first that does not. `unreflected` are channels that keep all of their light.
+vec3 direct_along(inout PixelLight l, vec3 direct, vec3 albedo, bvec3 unreflected, uint marks, uint count) {
     if (!FX_SOFT) return direct;
-    bool passed_over = (marks & PASSED_OVER) != 0u, only = count == 1u || (l.remainder & ALL_PASSED_OVER) != 0u;
-    l.remainder = (l.remainder & ~ALL_PASSED_OVER) | (passed_over && only ? ALL_PASSED_OVER : 0u);
-    if (passed_over) return mix(l.direct, radiance, whole);
-    if (only) l.direct = mix(direct, l.direct, whole);
+    bool passed_over = (marks & PASSED_OVER) != 0u, all_before = count == 1u || (l.remainder & ALL_PASSED_OVER) != 0u;
+    bool one_surface = count > 1u && largest_channel(l.albedo) > ONE_SURFACE * largest_channel(albedo) && !all(unreflected);
+    l.remainder = (l.remainder & ~ALL_PASSED_OVER) | (passed_over && all_before ? ALL_PASSED_OVER : 0u);
+    if (!one_surface || passed_over == all_before) return direct;
+    if (passed_over) return mix(l.direct, direct, unreflected);
+    l.direct = mix(direct, l.direct, unreflected);
     return direct;
 }
 
@@ -116,9 +123,9 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
         vec4 noted = texelFetch(samples, 3 * at + 2);
         uint marks = uint(noted.w);
         vec3 albedo = albedo_along(l, noted.rgb, marks, s.count);
-        bvec3 whole = lessThanEqual(albedo, vec3(MIN_ALBEDO));
+        bvec3 unreflected = lessThanEqual(albedo, vec3(MIN_ALBEDO));
         radiance = direct + indirect;
-        direct = direct_along(l, mix(direct, radiance, whole), radiance, whole, marks, s.count);
+        direct = direct_along(l, mix(direct, radiance, unreflected), albedo, unreflected, marks, s.count);
         other = luminance(radiance - direct);
         off_other = other - luminance(s.mean - l.direct);
         fold_light(l, direct, albedo, share, s.count);

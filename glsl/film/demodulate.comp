@@ -2,7 +2,6 @@
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
 #include "shared/luminance.glsl"
-#include "shared/sample_marks.glsl"
 
 // Takes one pixel per thread of a noisy image apart for a filter: colour = sharp + factor * filtered, where `sharp` is not
 // filtered and `filtered` is light before albedo. Twin: denoise::twin::demodulate.
@@ -33,16 +32,14 @@ bool sampled(int i) { return count_at(i) > 0.0 && finite(colour_at(i)); }
 
 // Pixels show one surface where their normals have at least this cosine, and one lies at most so far off the other's plane, as a share of
 // its depth.
-const float ALIKE = 0.9, OFF_PLANE = 0.02;
+const float ONE_SURFACE_COSINE = 0.9, ONE_PLANE = 0.02;
 const int AROUND = 2; // pixels; the weights have a standard deviation of one
-
-bool passed_over(int i) { return (PixelLight_remainder(light, i) & ALL_PASSED_OVER) != 0u; }
 
 // Whether pixel `q` tells how the key light shines on the surface that `i` shows.
 bool tells_key_light(int q, int i) {
     vec3 normal = Guide_normal(guide, i), off = Guide_position(guide, q) - Guide_position(guide, i);
-    return sampled(q) && !passed_over(q) && reflects(albedo_at(q)) && dot(normal, Guide_normal(guide, q)) > ALIKE
-        && abs(dot(normal, off)) < OFF_PLANE * Guide_depth(guide, i);
+    return sampled(q) && !passed_over(q) && reflects(albedo_at(q)) && dot(normal, Guide_normal(guide, q)) > ONE_SURFACE_COSINE
+        && abs(dot(normal, off)) < ONE_PLANE * Guide_depth(guide, i);
 }
 
 // Direct light. Where all samples passed over the key light, the pixels around tell what it brings.

@@ -1,7 +1,6 @@
 #include "shared/thread.glsl"
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
-#include "shared/sample_marks.glsl"
 
 // Divides the direct light of one pixel per thread by albedo, so that textures stay sharp; light of pixels without albedo, such as
 // lamps, stays as it is. Pixels without a finite value get count 0, and a filter in-paints them. Those that show a surface in part
@@ -31,6 +30,6 @@ void main() {
     float count = count_at(int(i));
     vec3 before_albedo = reflects(albedo) ? own / divisor(albedo) : own;
     bool known = count != 0.0 && finite(own);
-    bool keeps = (PixelLight_remainder(light, int(i)) & ALL_PASSED_OVER) != 0u || shows_in_part(int(i), albedo);
+    bool keeps = passed_over(int(i)) || shows_in_part(int(i), albedo);
     direct[i] = !known ? vec4(0.0) : keeps ? vec4(vec3(0.0), -count) : vec4(before_albedo, count);
 }

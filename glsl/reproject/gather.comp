@@ -26,6 +26,7 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/probe_cell.glsl"
 #include "shared/held.glsl"
 #include "shared/rests.glsl"
+#include "shared/sample_marks.glsl"
 
 // Steps towards where a point was on the last film. Where nothing but the camera moves the first place is exact.
 const int STEPS = 4;
@@ -48,6 +49,11 @@ void merge(inout Merged m, uint from, Carried c, float weight) {
     m.stats.m2 += weight * (count - 1.0) * h.variance + off * (off * (m.samples * part));
     if (FX_SPLIT) {
         HistoryLight l = HistoryLight_load(history_light, from);
+        bool passed_over = (l.remainder & ALL_PASSED_OVER) != 0u, all_before = m.samples == 0.0 || m.light.remainder != 0u;
+        // What knows nothing of the key light counts as what does.
+        if (passed_over && !all_before) l.direct = m.light.direct;
+        if (!passed_over && all_before) m.light.direct = l.direct;
+        m.light.remainder = passed_over && all_before ? ALL_PASSED_OVER : 0u;
         float other = luminance(h.mean - l.direct) - luminance(m.stats.mean - m.light.direct);
         m.light.indirect_m2 += weight * (count - 1.0) * l.indirect_variance + other * (other * (m.samples * part));
         m.light.direct += (l.direct - m.light.direct) * part;

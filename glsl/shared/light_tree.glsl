@@ -56,8 +56,8 @@ float brought_by(LightNode node, Receiver r) {
 }
 
 // The light that `u` chooses. Multiplies `probability` by that of the choice, which is 0 if no light brings anything. `bits` fill up what
-// each step takes of the digits of `u`. Leaves beside the way are considered for the key light: none below another node is as likely.
-uint choose_by_tree(Receiver r, float u, uint bits, inout float probability, inout KeyLight key) {
+// each step takes of the digits of `u`.
+uint choose_by_tree(Receiver r, float u, uint bits, inout float probability) {
     uint at = LightNode_child(light_nodes, 0u);
     float by_odds = 1.0 - EVEN_SHARE; // the probability that odds decide, given the steps so far
     bool ends;
@@ -83,10 +83,6 @@ uint choose_by_tree(Receiver r, float u, uint bits, inout float probability, ino
                 odds_here = odds;
             }
             before += part;
-            bool leaf = FX_SOFT && !FX_WEIGHED_LIGHTS && (children[i] & LIGHT_LEAF) != 0u;
-            uint light = children[i] & ~LIGHT_LEAF;
-            if (leaf && probability * part > key.probability && is_point_or_spot(Light_kind(lights, light)))
-                key = KeyLight(light, probability * part);
         }
         ends = next <= at || (next & LIGHT_LEAF) != 0u; // children lie behind their parents, so that every way ends
         at = next;
@@ -121,7 +117,7 @@ uint choose_light(Receiver r, inout uint word, out float probability, inout KeyL
     if (by_tree > 0.0 && place >= begin) {
         float digits = UNIT_STEP * unit_interval(hash); // below those of the word, in place of those that the choice uses up
         probability = begin > 0u ? float(0u - begin) * WORD : by_tree;
-        return choose_by_tree(r, min((unit_interval(word) + digits) / probability, BELOW_ONE), pcg(hash), probability, key);
+        return choose_by_tree(r, min((unit_interval(word) + digits) / probability, BELOW_ONE), pcg(hash), probability);
     }
     word = rest;
     return light;

@@ -1,5 +1,7 @@
 // The bindings of a noisy image that is to be demodulated: the film of a render, or the layers of any renderer's file. Twin:
 // denoise::twin::Pixels.
+#include "shared/sample_marks.glsl"
+
 layout(constant_id = 111) const bool OF_FILE = false; // counts are floats, and m2 is the variance of the mean
 layout(constant_id = 115) const bool HAS_LIGHT = false; // `light` holds a record of every pixel
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
@@ -18,3 +20,6 @@ float count_at(int i) {
 vec3 albedo_at(int i) {
     return HAS_LIGHT && count_at(i) > 0.0 ? PixelLight_albedo(light, i) : Guide_albedo(guide, i);
 }
+
+// Whether all samples of a pixel passed over the key light, of which they tell nothing.
+bool passed_over(int i) { return HAS_LIGHT && (PixelLight_remainder(light, i) & ALL_PASSED_OVER) != 0u; }

@@ -15,7 +15,7 @@ struct Path {
 struct SplitLight {
     vec3 direct;
     vec3 indirect;
-    vec3 soft; // with FX_SOFT what lamps and sky bring to the first hit, until the path's end; else zero
+    vec3 soft; // with FX_SOFT what all but the key light brings to the first hit, until the path's end; else zero
 };
 
 const uint DIRECT = 0u, INDIRECT = 1u, SOFT = 2u;

@@ -61,7 +61,7 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, View view, Sampler random, uint pair, 
     LightSample light = light_sample(receiver_of(s, bsdf, view), word, sample_2d(random, pair + PAIR_LIGHT));
     d.certainty = light.sharp;
     d.chosen = light.chosen;
-    d.key = light.chosen == light.key;
+    d.key = light.key != NONE && light.chosen == light.key;
     d.passed_over = light.key != NONE && !d.key;
     vec3 wi = light.direction * view.basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, view.wo, wi);
@@ -134,7 +134,7 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
         if (p.share < 1.0) p.albedo = seen_albedo(p.path.throughput, vec3(1.0), 1.0);
     }
     p.scattered += smooth_here ? 0u : 1u;
-    // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for what is sharp there.
+    // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for the key light there.
     bool ends = FX_SPARSE && p.sharp_only && p.scattered > (FX_SOFT ? 0u : 1u);
     d.shadowed = d.shadowed && (!ends || (FX_SOFT && d.key));
     d.alive = d.alive && !ends;

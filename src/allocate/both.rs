@@ -88,7 +88,7 @@ fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
 
 /// Squared deviations of indirect light, as the mean over the channels, derived from those of its luminance.
 fn indirect_squares(stats: &PixelStats, light: &PixelLight) -> f32 {
-    let indirect = Vec3::from(stats.mean) - Vec3::from(light.direct);
+    let indirect = (Vec3::from(stats.mean) - Vec3::from(light.direct)).abs();
     let level = luminance(indirect);
     let tint = indirect / level;
     let tint = if level > 0.0 { tint.min(Vec3::splat(MAX_TINT)) } else { Vec3::ZERO };

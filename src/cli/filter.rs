@@ -38,7 +38,7 @@ pub enum Light {
 /// Takes albedo, normals, positions, depth and variance from the layers of an EXR file, as Tallow, Blender, Mitsuba 3,
 /// pbrt-v4, V-Ray, Arnold, Octane and Unreal name them, and does without those that are missing. Surface colour is
 /// divided out before and multiplied back after. In Tallow's own files the layer of direct light stays as it is: lamps and
-/// sky that are seen, and the sharp shadows of point, spot and directional lights.
+/// sky that are seen, and the sharp shadows of the point, spot or directional light that a place chooses most often.
 #[derive(clap::Args)]
 pub struct Args {
     /// Image to filter (EXR; PNG, JPEG, HDR, TGA and BMP hold no layers)

@@ -75,9 +75,10 @@ impl Demodulated {
             let whole = Buffer::new(gpu, "whole", planes.radiance.len(), Location::Device)?;
             Cut::new(gpu, whole, &planes, factor)
         };
+        let light = constants.demodulation == Demodulation::Light as u32;
         Ok(Self {
             split: Kernel::new(gpu, &constants)?,
-            join: Kernel::new(gpu, &Default::default())?,
+            join: Kernel::new(gpu, &remodulate::Constants { light, ..Default::default() })?,
             cut: fireflies.factor().map(cut).transpose()?,
             planes,
             sparse,

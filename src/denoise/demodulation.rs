@@ -4,7 +4,7 @@
 ///
 /// | | filtered | factor | sharp |
 /// |---|---|---|---|
-/// | `Light` | all light but direct light, before albedo | that albedo | direct light: the emission that is seen, and what delta lights bring |
+/// | `Light` | all light but direct light, before albedo | that albedo | direct light: the emission that is seen, and what the key light brings |
 /// | `Albedo` | colour / albedo, or what a noisy mirror or clear glass shows | albedo, or 1 | lamps, sky |
 /// | `Off` | colour | 1 | nothing |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

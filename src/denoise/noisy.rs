@@ -43,7 +43,7 @@ impl Holds {
         }
     }
 
-    /// What is best kept away from a filter: direct light of a delta light that most samples choose, whose shadows are sharp and no
+    /// What is best kept away from a filter: direct light of the key light, whose shadows are sharp and no
     /// guide shows them. Other lights leave noise in direct light: where it holds any of theirs, it is filtered with all the rest.
     pub fn usual_demodulation(&self) -> Demodulation {
         self.demodulation(if self.sharp_direct { Demodulation::Light } else { Demodulation::Albedo })

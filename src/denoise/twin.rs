@@ -6,7 +6,7 @@ use super::{Demodulation, Holds};
 use crate::image::aov::Aovs;
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::demodulate::{ALIKE, AROUND, MIRRORED, OFF_PLANE, OUTLIER};
+use crate::shaders::demodulate::{AROUND, MIRRORED, ONE_PLANE, ONE_SURFACE_COSINE, OUTLIER};
 use crate::shaders::shared::albedo::{SMALLEST_ALBEDO, WHOLE};
 use crate::shaders::shared::sample_marks::ALL_PASSED_OVER;
 use glam::Vec3;
@@ -41,6 +41,8 @@ pub struct Parts {
     /// Direct light before albedo, for a filter to in-paint, where some pixels (0 samples) have none of their own. Some hand none on
     /// (fewer than 0).
     pub direct: Option<FilterInput>,
+    /// Whether it is that of [`Demodulation::Light`], whose whole is not negative.
+    pub light: bool,
 }
 
 impl Pixels {
@@ -123,7 +125,8 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
         let radiance = demodulate_direct(pixels);
         FilterInput { guide: pixels.guide_of(&radiance), ..input.with_radiance(radiance) }
     });
-    Parts { input, sharp: parts.iter().map(|p| p.sharp).collect(), factor, sharp_variance, direct }
+    let light = demodulation == Demodulation::Light;
+    Parts { input, sharp: parts.iter().map(|p| p.sharp).collect(), factor, sharp_variance, direct, light }
 }
 
 /// Twin of `demodulate_direct.comp`.
@@ -160,7 +163,12 @@ impl Parts {
     /// When that has another number of pixels.
     pub fn remodulate(&self, filtered: &[vec4]) -> Vec<vec3> {
         assert_eq!(filtered.len(), self.sharp.len(), "one filtered value per pixel");
-        let pixel = |i: usize| std::array::from_fn(|c| self.sharp[i][c] + self.factor[i][c] * filtered[i][c]);
+        let pixel = |i: usize| {
+            std::array::from_fn(|c| {
+                let whole = self.sharp[i][c] + self.factor[i][c] * filtered[i][c];
+                if self.light { whole.max(self.sharp[i][c].min(0.0)) } else { whole }
+            })
+        };
         (0..filtered.len()).map(pixel).collect()
     }
 }
@@ -205,7 +213,7 @@ fn tells_key_light(pixels: &Pixels, q: usize, i: usize) -> bool {
     let normal = Vec3::from(own.normal);
     let off = normal.dot(Vec3::from(theirs.position) - Vec3::from(own.position));
     let known = pixels.sampled(q) && !pixels.passed_over(q) && reflects(pixels.albedo(q));
-    known && normal.dot(theirs.normal.into()) > ALIKE && off.abs() < OFF_PLANE * own.depth
+    known && normal.dot(theirs.normal.into()) > ONE_SURFACE_COSINE && off.abs() < ONE_PLANE * own.depth
 }
 
 /// Direct light. Where all samples passed over the key light, the pixels around tell what it brings.

@@ -35,10 +35,10 @@ pub(crate) const INDIRECT_M2: &str = "indirect.m2";
 /// How far the lens blurs what a pixel shows, from 0, sharp, to 1: only in files of cameras with a lens.
 pub(crate) const BLUR: &str = "denoising blur";
 
-/// What rounding took off the means of pixels with thousands of samples, and whether all samples of a pixel went ways that few take:
-/// only in files that have such pixels.
-/// As [`crate::layout::PixelLight::remainder`].
+/// What rounding took off the means of direct light and albedo, and what no sample of a pixel has seen, as
+/// [`crate::layout::PixelLight::remainder`]: only in files where that is not 0.
 pub(crate) const LIGHT_REMAINDER: &str = "light.remainder";
+/// What rounding took off the means of pixels with thousands of samples: only in files that have such pixels; and [`LIGHT_REMAINDER`].
 const REMAINDERS: [&str; 2] = ["remainder", LIGHT_REMAINDER];
 
 /// Metadata of samples that are wrong.
@@ -162,7 +162,7 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
     }
 }
 
-/// Only pixels with thousands of samples, that show glass, or few of whose samples choose the key light have any.
+/// Only pixels with thousands of samples, that show glass, or none of whose samples chose the key light have remainders.
 fn drop_remainders_of_none(film: &mut Film) {
     let is_zero = |samples: &Samples| matches!(samples, Samples::U32(words) if words.iter().all(|&word| word == 0));
     film.channels.retain(|c| !(REMAINDERS.contains(&c.name.as_str()) && is_zero(&c.samples)));

@@ -3,7 +3,7 @@ use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::{pcg, unit_interval};
 use crate::math::srgb::luminance;
 use crate::shaders;
-use crate::shaders::accumulate::{MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
+use crate::shaders::accumulate::{MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO, ONE_SURFACE};
 use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, ASTRAY, PASSED_OVER};
 use crate::statistics::next_sample;
 use glam::{Vec3, Vec4};
@@ -23,16 +23,17 @@ struct Split {
 fn split(l: &mut PixelLight, direct: Vec3, radiance: Vec3, noted: Vec4, count: u32) -> Split {
     let marks = noted.w as u32;
     let albedo = albedo_along(l, noted.truncate(), marks & ASTRAY != 0, count);
-    let whole = albedo.cmple(Vec3::splat(MIN_ALBEDO));
-    let direct = Vec3::select(whole, radiance, direct);
+    let unreflected = albedo.cmple(Vec3::splat(MIN_ALBEDO));
+    let (direct, before) = (Vec3::select(unreflected, radiance, direct), Vec3::from(l.direct));
     let passed_over = marks & PASSED_OVER != 0;
-    let only = count == 1 || l.remainder & ALL_PASSED_OVER != 0;
-    l.remainder = (l.remainder & !ALL_PASSED_OVER) | if passed_over && only { ALL_PASSED_OVER } else { 0 };
-    if passed_over {
-        return Split { direct: Vec3::select(whole, radiance, l.direct.into()), albedo };
-    }
-    if only {
-        l.direct = Vec3::select(whole, l.direct.into(), direct).into();
+    let all_before = count == 1 || l.remainder & ALL_PASSED_OVER != 0;
+    let alike = Vec3::from(l.albedo).max_element() > ONE_SURFACE * albedo.max_element();
+    let one_surface = count > 1 && alike && !unreflected.all();
+    l.remainder = (l.remainder & !ALL_PASSED_OVER) | if passed_over && all_before { ALL_PASSED_OVER } else { 0 };
+    match one_surface && passed_over != all_before {
+        true if passed_over => return Split { direct: Vec3::select(unreflected, direct, before), albedo },
+        true => l.direct = Vec3::select(unreflected, before, direct).into(),
+        false => {}
     }
     Split { direct, albedo }
 }
@@ -235,6 +236,13 @@ mod tests {
         let (mean, direct, m2, remainder) = folded(&[other, other]);
         assert_eq!((mean, direct, remainder), (2.0, 0.0, ALL_PASSED_OVER));
         assert!(m2.abs() < 1e-6, "{m2}");
+        // Of a pixel that shows the sky beside the surface, samples bring what they bring: the sky is not counted for others.
+        let sky = [[8.0; 4], [0.0; 4], [0.0; 4]];
+        for order in [[sky, other, other, other], [other, sky, other, other], [other, sky, key, other]] {
+            let kept = order.iter().map(|sample| sample[0][0]).sum::<f32>() / 4.0;
+            let (_, direct, ..) = folded(&order);
+            assert!((direct - kept).abs() < 1e-6, "{direct}, expected {kept}: {order:?}");
+        }
         // A channel without albedo keeps all light there is.
         let dark = |mut sample: [vec4; 3]| {
             sample[2][0] = 0.0;

@@ -5,6 +5,7 @@ use crate::math::srgb::luminance;
 use crate::render::Carried;
 use crate::shaders::gather::{MOST_M2, STEPS};
 use crate::shaders::shared::history::*;
+use crate::shaders::shared::sample_marks::ALL_PASSED_OVER;
 use crate::twins::camera::{film_from_point, pixel_width};
 use crate::twins::surface::Surface;
 use glam::{IVec2, Vec2, Vec3, ivec2, vec2};
@@ -38,10 +39,17 @@ impl Merged {
             let off = h.mean[k] - stats.mean[k];
             *m2 += weight * (count - 1.0) * h.variance[k] + off * (off * between);
         }
+        let passed_over = l.remainder & ALL_PASSED_OVER != 0;
+        let all_before = self.samples == 0.0 || light.remainder != 0;
+        let direct = if passed_over && !all_before { light.direct } else { l.direct };
+        if !passed_over && all_before {
+            light.direct = direct;
+        }
+        light.remainder = if passed_over && all_before { ALL_PASSED_OVER } else { 0 };
         let other = |mean: [f32; 3], direct: [f32; 3]| luminance(Vec3::from(mean) - Vec3::from(direct));
-        let off = other(h.mean, l.direct) - other(stats.mean, light.direct);
+        let off = other(h.mean, direct) - other(stats.mean, light.direct);
         light.indirect_m2 += weight * (count - 1.0) * l.indirect_variance + off * (off * between);
-        light.direct = towards(light.direct, l.direct, part);
+        light.direct = towards(light.direct, direct, part);
         light.albedo = towards(light.albedo, l.albedo, part);
         stats.mean = towards(stats.mean, h.mean, part);
         self.samples = samples;

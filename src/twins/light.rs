@@ -6,9 +6,7 @@ use crate::math::warp::{
     basis_from_normal, circle_point, sine_cosine, warp_cone, warp_sphere, warp_tent, warp_triangle,
 };
 use crate::scene::{Environment, Scene};
-use crate::shaders::shared::light::{
-    EVEN_SHARE, KEY_PROBABILITY, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, MIN_VOLUME,
-};
+use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, MIN_VOLUME};
 use crate::twins::light_tree::{Choice, choose_light, nominal_pdf, spot_share};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, coat_lets_out, plane_clearance, unit_vector};
@@ -29,35 +27,14 @@ pub struct LightSample {
     pub pdf: f32,
     /// Of a light without extent, whose shadows are sharp, the probability that it is chosen; else 0.
     pub sharp: f32,
-    /// Index of the light.
+    /// Index of the light; [`NONE`] if none can bring anything.
     pub chosen: u32,
     /// That of the key light of the point, or [`NONE`].
     pub key: u32,
 }
 
-/// The light without extent that a point chooses most often, if it does so more often than [`KEY_PROBABILITY`]; else index [`NONE`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KeyLight {
-    /// Index of the light.
-    pub index: u32,
-    /// Probability of the choice.
-    pub probability: f32,
-}
-
-impl KeyLight {
-    /// None so far.
-    pub const NONE: Self = Self { index: NONE, probability: KEY_PROBABILITY };
-
-    /// Takes a light without extent for it, if that is chosen more often than those before.
-    pub fn consider(&mut self, index: u32, probability: f32) {
-        if probability > self.probability {
-            *self = Self { index, probability };
-        }
-    }
-}
-
 pub use crate::shaders::shared::segment::INFINITE_DISTANCE;
-pub use crate::twins::light_tree::Receiver;
+pub use crate::twins::light_tree::{KeyLight, Receiver};
 
 /// The entry that a random word chooses, and a word that is independent of it and as well stratified.
 pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
@@ -288,7 +265,7 @@ fn choose_by_share(scene: &Scene, r: &Receiver, u: f32, key: &mut KeyLight) -> (
     for &(index, _, brings) in lit() {
         key.consider(index, probability * mixed(brings / sum, number));
     }
-    let (mut before, mut chosen) = (0.0, (Light { probability, value: [0.0; 3], ..scene.lights[0] }, 0));
+    let (mut before, mut chosen) = (0.0, (Light { probability, value: [0.0; 3], ..scene.lights[0] }, NONE));
     for &(index, light, brings) in lit() {
         let share = mixed(brings / sum, number);
         chosen = (Light { probability: probability * share, ..*light }, index);
@@ -375,7 +352,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         let density = lamp_density(scene, light.material, brightness);
         sample.pdf = nominal_pdf(scene, density, light.probability / sample.pdf, p);
     }
-    (sample.chosen, sample.key) = (index, key.index);
+    (sample.chosen, sample.key) = (if by_tree && probability == 0.0 { NONE } else { index }, key.index);
     if by_tree && probability == 0.0 {
         sample.radiance = Vec3::ZERO;
     }

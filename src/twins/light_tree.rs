@@ -1,12 +1,11 @@
 //! Twin of `glsl/shared/light_tree.glsl`.
-use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_LEAF, LIGHT_SPOT, Light, LightNode};
+use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_LEAF, LIGHT_SPOT, Light, LightNode, NONE};
 use crate::math::hash::{pcg, unit_interval, word_of_unit};
 use crate::math::octahedral::{octahedral_decode, snorms};
 use crate::scene::Scene;
-use crate::shaders::shared::light::{EVEN_SHARE, MAX_ODDS};
+use crate::shaders::shared::light::{EVEN_SHARE, KEY_PROBABILITY, MAX_ODDS};
 use crate::shaders::shared::light_tree::{CHILDREN, COSINE_SLACK, LARGEST_SEEN, LEAST_COSINES, UNIT_STEP, WORD};
 use crate::shaders::shared::pcg::BELOW_ONE;
-use crate::twins::light::KeyLight;
 use glam::Vec3;
 
 /// What light is sampled for.
@@ -53,6 +52,27 @@ impl Receiver {
     }
 }
 
+/// The light without extent that a point chooses most often, if it does so more often than [`KEY_PROBABILITY`]; else index [`NONE`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeyLight {
+    /// Index of the light.
+    pub index: u32,
+    /// Probability of the choice.
+    pub probability: f32,
+}
+
+impl KeyLight {
+    /// None so far.
+    pub const NONE: Self = Self { index: NONE, probability: KEY_PROBABILITY };
+
+    /// Takes a light without extent for it, if that is chosen more often than those before.
+    pub fn consider(&mut self, index: u32, probability: f32) {
+        if probability > self.probability {
+            *self = Self { index, probability };
+        }
+    }
+}
+
 /// Share of a spot's intensity along `w`, from the point that it lights.
 pub fn spot_share(light: &Light, w: Vec3) -> f32 {
     let axis = Vec3::from(light.b);
@@ -96,11 +116,10 @@ pub fn brought_by(scene: &Scene, node: &LightNode, r: &Receiver) -> f32 {
     if faced && lit { (brings / d2).min(MAX_ODDS) } else { 0.0 }
 }
 
-/// The light of the tree that `u` chooses, where `choice` tells the probability that the tree does, and the key light of those beside it.
-/// Leaves beside the way are considered for that, too.
-pub fn choose_by_tree(scene: &Scene, r: &Receiver, mut u: f32, mut bits: u32, mut choice: Choice) -> Choice {
+/// The light that `u` chooses, and the probability of the choice, which is 0 if no light brings anything.
+pub fn choose_by_tree(scene: &Scene, r: &Receiver, mut u: f32, mut bits: u32) -> (u32, f32) {
     let mut at = scene.light_nodes[0].child;
-    let mut by_odds = 1.0 - EVEN_SHARE;
+    let (mut probability, mut by_odds) = (1.0, 1.0 - EVEN_SHARE);
     loop {
         let nodes = &scene.light_nodes[at as usize..(at + CHILDREN) as usize];
         let brings: Vec<f32> = nodes.iter().map(|node| brought_by(scene, node, r)).collect();
@@ -114,15 +133,13 @@ pub fn choose_by_tree(scene: &Scene, r: &Receiver, mut u: f32, mut bits: u32, mu
                 (at, start, share, odds_here) = (node.child, before, part, odds);
             }
             before += part;
-            let light = node.child & !LIGHT_LEAF;
-            if node.child & LIGHT_LEAF != 0 && scene.lights[light as usize].is_point_or_spot() {
-                choice.key.consider(light, choice.probability * part);
-            }
         }
-        choice.probability *= share;
-        if share == 0.0 || at & LIGHT_LEAF != 0 {
-            choice.light = if share > 0.0 { at & !LIGHT_LEAF } else { 0 };
-            return choice;
+        if share == 0.0 {
+            return (0, 0.0);
+        }
+        probability *= share;
+        if at & LIGHT_LEAF != 0 {
+            return (at & !LIGHT_LEAF, probability);
         }
         by_odds = (by_odds * odds_here / share).min(1.0);
         u = ((u - start + UNIT_STEP * unit_interval(bits)) / share).min(BELOW_ONE);
@@ -139,7 +156,7 @@ pub struct Choice {
     pub rest: u32,
     /// The probability of the choice; 0 if no light can bring anything.
     pub probability: f32,
-    /// The key light among those that were considered.
+    /// The key light among those that lie beside the tree.
     pub key: KeyLight,
 }
 
@@ -163,8 +180,8 @@ pub fn choose_light(scene: &Scene, r: &Receiver, word: u32) -> Choice {
     if root.power > 0.0 && place >= begin {
         let u = unit_interval(word) + UNIT_STEP * unit_interval(hash);
         let by_tree = if begin > 0 { begin.wrapping_neg() as f32 * WORD } else { root.power };
-        let choice = Choice { rest: word, probability: by_tree, ..chosen };
-        return choose_by_tree(scene, r, (u / by_tree).min(BELOW_ONE), pcg(hash), choice);
+        let (light, probability) = choose_by_tree(scene, r, (u / by_tree).min(BELOW_ONE), pcg(hash));
+        return Choice { light, rest: word, probability: by_tree * probability, ..chosen };
     }
     chosen
 }

@@ -329,7 +329,7 @@ impl Tracer<'_> {
             if self.frame.path.light_count > 0 && !smooth_here {
                 let SampledLight { brought, sharp, chosen, key } =
                     self.light_from_nee(&p, random, mask_seed(seed, 2 * bounce + 1));
-                let (is_key, first) = (soft && chosen == key, seen.scattered == 1);
+                let (is_key, first) = (soft && key != NONE && chosen == key, seen.scattered == 1);
                 let brought = brought.filter(|_| !ends || is_key);
                 rays += u32::from(brought.is_some());
                 let light = path.throughput * brought.unwrap_or_default();

@@ -93,8 +93,32 @@ fn floors_that_bulbs_light_have_no_grain_behind_a_filter() {
         let (_, guide, clean) = rendered(&gpu, spp);
         let off = |(c, at): (&f32, &Guide)| (c / brought(at).iter().sum::<f32>() - 1.0).powi(2);
         let error = (clean.iter().zip(&guide).map(off).sum::<f32>() / clean.len() as f32).sqrt();
-        println!("{spp}: {error}");
         assert!(error < most, "{spp} samples: {error}");
+    }
+    assert_silent(&gpu);
+}
+
+/// A sun, the first of the lights, on a floor above bulbs that bring nothing there: a choice of one of those is none of the sun.
+#[test]
+fn a_choice_that_brings_nothing_is_not_taken_for_the_key_light() {
+    let gpu = gpu();
+    let (irradiance, slope) = (2.0, [0.6, -0.8, 0.0]);
+    let mut text = format!(
+        "[film]\nwidth = 16\nheight = 9\n[camera]\nposition = [0.0, 3.0, 0.5]\ntarget = [0.0, 0.0, 0.0]\nfov = 50.0\n\
+         [render]\nspp = 4\nmax_depth = 2\n[[material]]\nname = 'floor'\ncolor = {ALBEDO}\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'floor'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 9.0 }}\n\
+         [[light]]\ntype = 'directional'\ndirection = {slope:?}\nirradiance = {irradiance}\n"
+    );
+    for [x, y, z] in BULBS.map(|(position, _)| position) {
+        text += &format!("[[light]]\ntype = 'point'\nposition = {:?}\nintensity = 20.0\n", [x, -y, z]);
+    }
+    let scene = Scene::parse(Path::new("below.toml"), &text).unwrap();
+    assert!(scene.weighed_lights && (0.4..0.9).contains(&scene.lights[0].probability), "{:?}", scene.lights);
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    support::render(&gpu, &renderer);
+    let expected = ALBEDO / PI * irradiance * -slope[1];
+    for l in renderer.film().tiles[0].light.read().unwrap() {
+        assert!((l.direct[0] / expected - 1.0).abs() < 1e-4, "{l:?}, expected {expected}");
     }
     assert_silent(&gpu);
 }

@@ -421,8 +421,14 @@ fn expected_errors_solve_the_worked_example() {
         input.radiance[0] = first;
         input.variance = Some(vec![[0.04; 3]; 4]);
         let sharp = sharp.map(|v| [v; 3]).to_vec();
-        let parts =
-            Parts { input, sharp, factor: vec![[0.5; 3]; 4], sharp_variance: vec![sharp_variance; 4], direct: None };
+        let parts = Parts {
+            input,
+            sharp,
+            factor: vec![[0.5; 3]; 4],
+            sharp_variance: vec![sharp_variance; 4],
+            direct: None,
+            light: true,
+        };
         expected::reference(&parts, &[[filtered, filtered, filtered, 4.0]; 4], &[[0.01, 0.5, 0.25]; 4]).unwrap()
     };
     let row = |sharp, sharp_variance, filtered| of([2.0, 2.0, 2.0, 4.0], sharp, sharp_variance, filtered);

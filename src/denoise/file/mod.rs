@@ -20,6 +20,7 @@ pub struct Layers<'a> {
     /// Whether the file tells what surfaces reflect.
     reflects: bool,
     indirect_m2: Option<&'a [f32]>,
+    remainder: Option<&'a [u32]>,
     blur: Option<&'a [f32]>,
     /// What had to be made up: one line each.
     pub notes: Vec<String>,
@@ -42,6 +43,7 @@ impl<'a> Layers<'a> {
             places: Places::new(aovs, &mut notes),
             reflects: false,
             indirect_m2: film.floats(INDIRECT_M2).filter(|_| aovs.get(Aov::Indirect).is_some()),
+            remainder: film.words(LIGHT_REMAINDER),
             blur: film.floats(BLUR),
             notes,
         };
@@ -113,7 +115,7 @@ impl<'a> Layers<'a> {
             direct: at(Aov::Direct),
             indirect_m2: self.indirect_m2.map_or(0.0, |m2| m2[i]),
             albedo: self.albedo(i),
-            remainder: self.aovs.film.words(LIGHT_REMAINDER).map_or(0, |w| w[i]),
+            remainder: self.remainder.map_or(0, |words| words[i]),
             ..Default::default()
         }
     }

@@ -173,38 +173,48 @@ fn pixels_that_show_a_surface_in_part_hand_no_direct_light_on() {
     assert_eq!(parts.sharp, [[0.4; 3], [0.475; 3], [0.5; 3], [0.5; 3]], "it keeps its own");
 }
 
-/// A wall of albedo .5 under a key light that brings 2 before albedo. The samples of the second pixel, of albedo .25, passed over it; the
-/// third lies 1 off the wall, the fourth looks elsewhere, the last is a lamp. Only the first tells.
+/// A wall of albedo .5 under a key light that brings 2 before albedo. The samples of the pixel in the middle, of albedo .25, passed over it.
+/// Of those around, the first looks elsewhere, the fourth lies 1 off the wall, the last is a lamp before it. Only the second tells.
 #[test]
 fn key_light_that_all_samples_passed_over_is_that_around() {
     let mut film = Film::new(5, 1);
     film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
-    film.add_vec3("", RGB, &[[1.5; 3], [1.0; 3], [9.0; 3], [4.0; 3], [50.0; 3]]);
-    film.add_vec3("albedo", RGB, &[[0.5; 3], [0.25; 3], [0.5; 3], [0.5; 3], [0.0; 3]]);
-    film.add_vec3("direct", RGB, &[[1.0; 3], [0.0; 3], [8.0; 3], [3.0; 3], [50.0; 3]]);
-    film.add_vec3("indirect", RGB, &[[1.0; 3], [4.0; 3], [2.0; 3], [2.0; 3], [0.0; 3]]);
-    film.add_vec3(
-        "P",
-        ["X", "Y", "Z"],
-        &[[0.0, 0.0, -5.0], [0.1, 0.0, -5.0], [0.2, 0.0, -4.0], [0.3, 0.0, -5.0], [0.4, 0.0, -5.0]],
-    );
+    film.add_vec3("", RGB, &[[4.0; 3], [1.5; 3], [1.0; 3], [9.0; 3], [50.0; 3]]);
+    film.add_vec3("albedo", RGB, &[[0.5; 3], [0.5; 3], [0.25; 3], [0.5; 3], [0.0; 3]]);
+    film.add_vec3("direct", RGB, &[[3.0; 3], [1.0; 3], [0.0; 3], [8.0; 3], [50.0; 3]]);
+    film.add_vec3("indirect", RGB, &[[2.0; 3], [1.0; 3], [4.0; 3], [2.0; 3], [0.0; 3]]);
+    let places = [0.0, 0.1, 0.2, 0.3, 0.4].map(|x: f32| [x, 0.0, if x == 0.3 { -4.0 } else { -5.0 }]);
+    film.add_vec3("P", ["X", "Y", "Z"], &places);
     film.add("Z", Samples::F32(vec![5.0; 5]));
     film.add("samples", Samples::U32(vec![4; 5]));
-    let parts = |third: [f32; 3], remainder: u32| {
+    let parts = |first: [f32; 3], remainder: u32| {
         let mut film = film.clone();
-        let n = [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], third, [0.0, 0.0, 1.0]];
-        film.add_vec3("N", ["X", "Y", "Z"], &n);
-        film.add("light.remainder", Samples::U32(vec![0, remainder, 0, 0, 0]));
+        let ahead = [0.0, 0.0, 1.0];
+        film.add_vec3("N", ["X", "Y", "Z"], &[first, ahead, ahead, ahead, ahead]);
+        film.add("light.remainder", Samples::U32(vec![0, 0, remainder, 0, 0]));
         take_apart(&film, Demodulation::Light)
     };
     let found = parts([1.0, 0.0, 0.0], ALL_PASSED_OVER);
     // .25 * 2 of the 1 is direct light, and .5 / .25 the rest before albedo.
-    assert_eq!((found.sharp[1], found.input.radiance[1]), ([0.5; 3], [2.0, 2.0, 2.0, 4.0]));
-    // Turned round, the fourth tells of 6, at two pixels' distance: weights exp(-1/2) and exp(-2).
+    assert_eq!((found.sharp[2], found.input.radiance[2]), ([0.5; 3], [2.0, 2.0, 2.0, 4.0]));
+    // Turned round, the first tells of 6, at two pixels' distance: weights exp(-1/2) and exp(-2).
     let [near, far] = [-0.5f32, -2.0].map(f32::exp);
     let both = 0.25 * (2.0 * near + 6.0 * far) / (near + far);
-    assert!((parts([0.0, 0.0, 1.0], ALL_PASSED_OVER).sharp[1][0] - both).abs() < 1e-6);
-    assert_eq!(parts([1.0, 0.0, 0.0], 0).sharp[1], [0.0; 3], "control");
+    assert!((parts([0.0, 0.0, 1.0], ALL_PASSED_OVER).sharp[2][0] - both).abs() < 1e-6);
+    assert_eq!(parts([1.0, 0.0, 0.0], 0).sharp[2], [0.0; 3], "control");
+}
+
+/// Filtered light may be negative beside a key light, and the whole may not; where the colour is filtered as a whole, that is kept.
+#[test]
+fn wholes_of_direct_and_filtered_light_are_not_negative() {
+    let mut film = film();
+    film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+    film.add_vec3("direct", RGB, &[[0.5; 3], [0.5; 3], [25.0; 3], [50.0; 3]]);
+    film.add_vec3("indirect", RGB, &[[1.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]]);
+    let filtered = [[-0.5; 4], [-2.0; 4], [0.0; 4], [0.0; 4]];
+    let of = |demodulation| take_apart(&film, demodulation).remodulate(&filtered);
+    assert_eq!(of(Demodulation::Light)[..2], [[0.25; 3], [0.0; 3]]);
+    assert_eq!(of(Demodulation::Off)[..2], [[-0.5; 3], [-2.0; 3]]);
 }
 
 /// However the image is taken apart, and whatever its other layers hold.

@@ -49,9 +49,9 @@ choices! {
     pub enum Split {
         /// `indirect` holds light of two bounces and more, over the albedo of what is seen first.
         Indirect,
-        /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what a point, spot
-        /// or directional light brings that 90 % of the samples or more choose: its shadows are sharp, and its noise is that of the choice
-        /// and of what edges and masks hide.
+        /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what the point,
+        /// spot or directional light brings that a place chooses most often, in more than 40 % of the choices: its shadows are sharp, and its
+        /// noise is that of what edges and masks hide.
         #[default]
         Soft,
     }
