@@ -3,6 +3,7 @@
 use crate::glazed::glazed;
 use crate::support::{assert_silent, render_steps, tuned_gpu};
 use crate::tuning::{OUTPUTS, bits, film, scene};
+use crate::twin::{BULB, SUN, many_lamps_and};
 use tallow::gpu::{FrameResources, Gpu, Tuning};
 use tallow::layout::{BSDF_DIELECTRIC, MATERIAL_MASKED, Material};
 use tallow::profile::work::FrameWork;
@@ -21,6 +22,11 @@ fn glass() -> Loaded {
         (stone.opacity, stone.flags) = (0.6, stone.flags | MATERIAL_MASKED);
     }
     scene.with(|s| s.max_depth = 8)
+}
+
+/// A bulb that some places choose most often, and a sun that others do, beside many lamps.
+fn key_lights() -> Loaded {
+    many_lamps_and(3, &[BULB, SUN].concat())
 }
 
 /// Batches of a hundred paths, of which a thread traces up to eight.
@@ -52,10 +58,11 @@ fn settings_of_all_kinds_have_the_same_bits() {
         ("independent numbers", |s| s.sampler = Sampler::Independent),
     ];
     let grass = || scene("grass/scene.toml", "uniform");
-    let scenes = changes
-        .into_iter()
-        .map(|(what, change)| (what, grass().with(change)))
-        .chain([("glass and holes", glass()), ("panes", glazed(grass()))]);
+    let scenes = changes.into_iter().map(|(what, change)| (what, grass().with(change))).chain([
+        ("glass and holes", glass()),
+        ("panes", glazed(grass())),
+        ("key lights", key_lights()),
+    ]);
     for (what, scene) in scenes {
         let scene = scene.with(|s| (s.width, s.height, s.spp) = (20, 15, 4));
         assert!(film(&whole, &scene) == film(&wavefront, &scene), "{what}");

@@ -208,6 +208,11 @@ pub fn many_lamps(points: usize) -> Loaded {
     many_lamps_and(points, "")
 }
 
+/// A bulb that is the key light of what is near it, beside [`many_lamps`].
+pub const BULB: &str = "[[light]]\ntype = 'point'\nposition = [-3.2, 0.9, 0.0]\nintensity = 20.0\n";
+/// A sun that is the key light of the rest.
+pub const SUN: &str = "[[light]]\ntype = 'directional'\ndirection = [0.5, -1.0, 0.2]\nirradiance = 1.6\n";
+
 /// The same, and what the tables `more` say.
 pub fn many_lamps_and(points: usize, more: &str) -> Loaded {
     let mut random = Random::new(11);

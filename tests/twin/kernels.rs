@@ -3,7 +3,7 @@
 use crate::support::kernels::{accumulate as fold_kernel, traverse as traverse_kernel};
 use crate::support::{self, assert_silent, gpu};
 use crate::twin::{
-    Aim, BALL, MIRRORS, PATTERNS, Random, Workplace, aimed_at_seam, ball, instanced_ball, many_lamps_and,
+    Aim, BALL, BULB, MIRRORS, PATTERNS, Random, SUN, Workplace, aimed_at_seam, ball, instanced_ball, many_lamps_and,
     patterned_lamp, under_a_panel,
 };
 use glam::{Vec3, Vec4};
@@ -144,7 +144,7 @@ fn marked(albedo: Vec3, marks: u32) -> Vec3 {
 }
 
 fn marks(sample: &PathSample) -> u32 {
-    u32::from(sample.astray) * ASTRAY | u32::from(sample.passed_over) * PASSED_OVER
+    (u32::from(sample.astray) * ASTRAY) | (u32::from(sample.passed_over) * PASSED_OVER)
 }
 
 /// Direct light, indirect light and albedo of the twin's samples one after the other, and the rays that it traced.
@@ -277,10 +277,7 @@ fn renders_agree_with_their_twins() {
     check("wide sky", &run(&gpu, &sky, called_for(&sky, &sky.settings, outputs)));
     let mut panel = under_a_panel();
     small(&mut panel.settings);
-    // A bulb that is the key light of what is near it and a sun that is that of the rest, and a sun beside a tree alone.
-    let bulb = "[[light]]\ntype = 'point'\nposition = [-3.2, 0.9, 0.0]\nintensity = 20.0\n";
-    let sun = "[[light]]\ntype = 'directional'\ndirection = [0.5, -1.0, 0.2]\nirradiance = 1.6\n";
-    for (points, more) in [(3, [bulb, sun].concat()), (40, sun.to_owned())] {
+    for (points, more) in [(3, [BULB, SUN].concat()), (40, SUN.to_owned())] {
         let mut lamps = many_lamps_and(points, &more);
         small(&mut lamps.settings);
         assert!(lamps.has_light_tree() && lamps.weighed_lights == (points < 33));
@@ -392,7 +389,10 @@ fn marked_samples_are_folded_as_by_the_twin() {
         let mut sample = repeated(pixel, k);
         // The next pixel's samples pass over the key light.
         let [astray, passed_over] = [pixel, (pixel + 1) % REPEATED].map(|p| MARKED[p as usize] >> k & 1);
-        sample[2][3] = (astray * ASTRAY | passed_over * PASSED_OVER) as f32;
+        // One shows the sky, before one that passes over the key light.
+        let albedo = if k == 2 && pixel == 3 { 0.0 } else { 1.0 };
+        sample[2][..3].iter_mut().for_each(|v| *v *= albedo);
+        sample[2][3] = ((astray * ASTRAY) | (passed_over * PASSED_OVER)) as f32;
         sample
     };
     let samples: Vec<vec4> = (0..4).flat_map(|k| (0..REPEATED).flat_map(move |pixel| sample(k, pixel))).collect();
