@@ -18,11 +18,10 @@ const uint ALBEDO = 9u;         // probability of the way
 const uint SOFT_LIGHT = 10u;    // certainty of the light that is sampled
 const uint KINDS = 11u;
 
-// Bits of the state: the path waits for a shadow ray, and for one to its next surface; it leaves a smooth surface; its
-// shadow ray leads to the key light; that ray passes clear walls; where the
-// path first met a surface that is not smooth, it chose another. Then surfaces that are not smooth, up to 2, and all surfaces.
-const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, KEY = 8u, PASSING = 16u, PASSED = 32u,
-           SCATTERED_AT = 6u, BOUNCE_AT = 8u;
+// Bits of the state: the path waits for a shadow ray, and for one to its next surface; it leaves a smooth surface; its shadow ray
+// leads to the key light; that ray passes clear walls; where the path first met a surface that is not smooth, it chose another light than the
+// key light. Then surfaces that are not smooth, up to 2, and all surfaces.
+const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, KEY = 8u, PASSING = 16u, PASSED = 32u, SCATTERED_AT = 6u, BOUNCE_AT = 8u;
 
 uint place_of(uint kind, uint i) { return kind * path_count() + i; }
 

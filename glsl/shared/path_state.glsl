@@ -63,7 +63,7 @@ struct Departure {
     bool shadowed;
     float certainty; // the probability that it was chosen, if it brings sharp shadows; else 0
     uint chosen;     // its index
-    bool key;        // whether it is the key light
+    bool key;         // whether it is the key light
     bool passed_over; // whether there is a key light, and it is not that
     bool alive;
 };
