@@ -62,7 +62,7 @@ pub struct KeyLight {
 }
 
 impl KeyLight {
-    /// None so far.
+    /// That of a point none of whose lights has been considered.
     pub const NONE: Self = Self { index: NONE, probability: KEY_PROBABILITY };
 
     /// Takes a light without extent for it, if that is chosen more often than those before.

@@ -86,6 +86,12 @@ struct SampledLight {
     key: u32,
 }
 
+impl SampledLight {
+    fn is_key(&self) -> bool {
+        self.key != NONE && self.chosen == self.key
+    }
+}
+
 /// As `kind_of_light` of the kernel.
 fn kind_of_light(seen: &Seen) -> Kind {
     match seen.scattered {
@@ -205,6 +211,12 @@ impl Tracer<'_> {
         }
     }
 
+    /// Adds sampled light, of which the share `kept` needs no filter.
+    fn add_sampled(&self, sum: &mut Sum, seen: &Seen, light: Vec3, kept: f32) {
+        self.add_light(sum, kept * light, Kind::Direct);
+        self.add_light(sum, (1.0 - kept) * light, kind_of_light(seen));
+    }
+
     fn clamped(&self, light: Vec3) -> Vec3 {
         let (largest, limit) = (light.max_element(), self.frame.path.clamp_indirect);
         let clamps = self.effects.clamp && limit > 0.0 && largest > limit;
@@ -322,23 +334,19 @@ impl Tracer<'_> {
                 break;
             }
             let p = self.shade(s, path.direction, pair, from);
-            let smooth_here = bsdf_is_delta(&p.bsdf);
             seen.note(&p, path.throughput);
             let soft = self.effects.soft_light;
             let ends = sharp_only && seen.scattered > u32::from(!soft);
-            if self.frame.path.light_count > 0 && !smooth_here {
-                let SampledLight { brought, sharp, chosen, key } =
-                    self.light_from_nee(&p, random, mask_seed(seed, 2 * bounce + 1));
-                let (is_key, first) = (soft && key != NONE && chosen == key, seen.scattered == 1);
-                let brought = brought.filter(|_| !ends || is_key);
+            if self.frame.path.light_count > 0 && !bsdf_is_delta(&p.bsdf) {
+                let sampled = self.light_from_nee(&p, random, mask_seed(seed, 2 * bounce + 1));
+                let (is_key, first) = (soft && sampled.is_key(), seen.scattered == 1);
+                let brought = sampled.brought.filter(|_| !ends || is_key);
                 rays += u32::from(brought.is_some());
                 let light = path.throughput * brought.unwrap_or_default();
-                let kept = if is_key && first { sharp } else { 0.0 };
-                self.add_light(&mut sum, kept * light, Kind::Direct);
-                self.add_light(&mut sum, (1.0 - kept) * light, kind_of_light(&seen));
-                passed_over |= first && soft && key != NONE && !is_key;
-                if seen.scattered == 1 && choice == NONE && seen.share == 1.0 {
-                    (certain, choice) = (sharp * light, chosen);
+                self.add_sampled(&mut sum, &seen, light, if is_key && first { sampled.sharp } else { 0.0 });
+                passed_over |= first && soft && sampled.key != NONE && !is_key;
+                if first && choice == NONE && seen.share == 1.0 {
+                    (certain, choice) = (sampled.sharp * light, sampled.chosen);
                 }
             }
             if !self.scatter(&mut path, &p, random) || ends {
