@@ -17,7 +17,8 @@ struct LightSample {
     float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
     float sharp;    // of a light without extent, whose shadows are sharp, the probability that it is chosen; else 0
     uint chosen;    // index of the light; NONE if none can bring anything
-    uint key;       // with FX_SOFT that of the key light, if the point has one; else NONE
+    uint key;       // with FX_SOFT that of the key light, if the point has one of which anything is kept; else NONE
+    float kept;     // the share that is kept of the key light
 };
 
 // What light is sampled for.
@@ -31,19 +32,29 @@ struct Receiver {
     float alpha2;             // squared roughness of that lobe, above 0
 };
 
-// The key light of a point is the light without extent that it chooses most often, if it does so more often than this. Its light is kept
-// apart, as its shadows are sharp; that of all others has the noise of the choice, and a filter takes it with what is soft. At .4
-// four samples, whose choices are spread evenly, hold at least one; .5 leaves 1.05 of the error below six bulbs.
-const float KEY_PROBABILITY = 0.4;
-
+// The key light of a point is the light without extent that it chooses most often. A share of its light is kept apart, as its shadows are
+// sharp; that of all others has the noise of the choice, and a filter takes it with what is soft.
 struct KeyLight {
     uint index;
     float probability; // of the choice
+    float rival;       // that of the likeliest other light that may be the key light elsewhere; 0 without one
 };
 
-// Takes a light without extent for the key light, if it is chosen more often than those before.
+// Takes a light without extent, chosen as often everywhere, for the key light, if it is chosen more often than those before.
 void consider(inout KeyLight key, uint light, float probability) {
-    if (probability > key.probability) key = KeyLight(light, probability);
+    if (probability > key.probability) key = KeyLight(light, probability, 0.0);
+}
+
+// Of one that is chosen so seldom nothing is kept, as most samples pass it over; and all, if nothing rivals it, at twice that probability,
+// where four samples, whose choices are spread evenly, hold at least one of it.
+const float KEY_PROBABILITY = 0.2;
+
+// The share that is kept. It is 0 where another light becomes the key light: a step in what is kept is one the other way round in what is
+// filtered, and a filter that blurs it leaves lines on smooth floors.
+float kept_share(KeyLight key) {
+    if (key.probability <= KEY_PROBABILITY) return 0.0;
+    float rival = key.rival / key.probability;
+    return min(key.probability / KEY_PROBABILITY - 1.0, 1.0) * (1.0 - rival * rival);
 }
 
 const float MAX_ODDS = 1e30; // so that sums of odds stay finite
@@ -302,6 +313,7 @@ float unshadowed(Light light, Receiver r) {
 // the others. A lamp beside a hidden one of 1, 100 and 10,000 times its power, 16 samples a pixel: relMSE .0043, .49 and 11 without,
 // .0054, .22 and .76 with this share, .0056, .15 and .32 with .1, which costs more noise where nothing is hidden.
 const float EVEN_SHARE = 0.05;
+float weighed_share(float of_all, float number) { return mix(of_all, 1.0 / number, EVEN_SHARE); }
 
 // Chooses anew among the point and spot lights, one of which the table has chosen: by what each would bring if nothing were in its way
 // (resampling of all candidates: Talbot, Cline and Egbert 2005). The sun would starve lamps in its shade, so that lights at infinity
@@ -310,19 +322,28 @@ Light choose_by_share(Receiver r, float u, out uint index, inout KeyLight key) {
     Light chosen = Light_load(lights, 0u);
     index = NONE;
     float sum = 0.0, number = 0.0, group = 0.0;
-    KeyLight brightest = KeyLight(NONE, 0.0); // by what it brings
+    float most = 0.0, next = 0.0; // of what they bring
+    uint brightest = NONE;
     uint end = 0u;
     for (; end < push.constants.light_count; end++) {
         Light light = Light_load(lights, end);
         if (is_triangle_light(light.kind) || light.kind == LIGHT_SPHERE) break;
         if (!is_point_or_spot(light.kind)) continue;
         float brings = unshadowed(light, r);
-        consider(brightest, end, brings);
+        next = max(next, min(brings, most));
+        if (brings > most) brightest = end;
+        most = max(most, brings);
         sum += brings;
         number += brings > 0.0 ? 1.0 : 0.0;
         group += light.probability;
     }
-    if (FX_SOFT && sum > 0.0) consider(key, brightest.index, group * mix(brightest.probability / sum, 1.0 / number, EVEN_SHARE));
+    // Lights at infinity are chosen as often everywhere: they have the key light in all places or in none, so that where a lamp's light ends
+    // theirs is kept as before.
+    if (FX_SOFT && group > key.probability) {
+        float likeliest = sum > 0.0 ? group * weighed_share(most / sum, number) : 0.0;
+        float rival = next > 0.0 ? group * weighed_share(next / sum, number) : 0.0;
+        key = KeyLight(brightest, likeliest, rival);
+    }
     // Each light has one interval of [0, 1), so that numbers which are spread evenly there choose lights evenly.
     float before = 0.0, share = 0.0;
     for (uint i = 0u; i < end && sum > 0.0 && u >= before; i++) {
@@ -331,7 +352,7 @@ Light choose_by_share(Receiver r, float u, out uint index, inout KeyLight key) {
         if (brings <= 0.0) continue;
         chosen = light; // in the end the last, if rounding leaves something
         index = i;
-        share = mix(brings / sum, 1.0 / number, EVEN_SHARE);
+        share = weighed_share(brings / sum, number);
         before += share;
     }
     chosen.probability = share > 0.0 ? group * share : group;
@@ -350,7 +371,7 @@ float lamp_density(uint material, float brightness) {
 
 // The key light among those that the table alone chooses.
 KeyLight key_of_table() {
-    KeyLight key = KeyLight(NONE, KEY_PROBABILITY);
+    KeyLight key = KeyLight(NONE, 0.0, 0.0);
     for (uint i = 0u; i < push.constants.light_count; i++) {
         uint kind = Light_kind(lights, i);
         if (is_triangle_light(kind) || kind == LIGHT_SPHERE) break;
@@ -363,8 +384,8 @@ KeyLight key_of_table() {
 // Samples one light for a receiver. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(Receiver r, uint word, vec2 u) {
     vec3 p = r.position;
-    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, 0.0, 0u, NONE);
-    KeyLight key = KeyLight(NONE, KEY_PROBABILITY);
+    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, 0.0, 0u, NONE, 0.0);
+    KeyLight key = KeyLight(NONE, 0.0, 0.0);
     uint count = push.constants.light_count, index = 0u, rest = word;
     float probability = 0.0;
     if (FX_LIGHT_TREE) index = choose_light(r, rest, probability, key);
@@ -405,7 +426,8 @@ LightSample light_sample(Receiver r, uint word, vec2 u) {
         s.pdf = nominal_pdf(density, light.probability / s.pdf, p);
     }
     s.chosen = FX_LIGHT_TREE && probability == 0.0 ? NONE : index;
-    s.key = key.index;
+    s.kept = FX_SOFT ? kept_share(key) : 0.0;
+    s.key = s.kept > 0.0 ? key.index : NONE;
     if (FX_LIGHT_TREE && probability == 0.0) s.radiance = vec3(0.0);
     return s;
 }

@@ -15,13 +15,13 @@ const uint HIT = 6u;            // four words of the hit
 const uint DIRECT_LIGHT = 7u;   // closest-hit rays
 const uint INDIRECT_LIGHT = 8u; // distance of the hit
 const uint ALBEDO = 9u;         // probability of the way
-const uint SOFT_LIGHT = 10u;    // certainty of the light that is sampled
+const uint SOFT_LIGHT = 10u;    // share of the sampled light that is kept apart
 const uint KINDS = 11u;
 
 // Bits of the state: the path waits for a shadow ray, and for one to its next surface; it leaves a smooth surface; its shadow ray
-// leads to the key light; that ray passes clear walls; where the path first met a surface that is not smooth, it chose another light than the
-// key light. Then surfaces that are not smooth, up to 2, and all surfaces.
-const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, KEY = 8u, PASSING = 16u, PASSED = 32u, SCATTERED_AT = 6u, BOUNCE_AT = 8u;
+// passes clear walls; where the path first met a surface that is not smooth, it chose another light than the key light. Then surfaces that
+// are not smooth, up to 2, and all surfaces.
+const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, PASSING = 8u, PASSED = 16u, SCATTERED_AT = 5u, BOUNCE_AT = 7u;
 
 uint place_of(uint kind, uint i) { return kind * path_count() + i; }
 
@@ -44,7 +44,7 @@ void save_hit(uint i, Hit hit) {
 }
 
 void save_path(uint i, PathState p, Departure d) {
-    uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) | (d.key ? KEY : 0u) |
+    uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) |
                  ((d.shadow.mask_seed & PASSES_WALLS) != 0u ? PASSING : 0u) | (p.passed_over ? PASSED : 0u) |
                  min(p.scattered, 2u) << SCATTERED_AT | p.bounce << BOUNCE_AT;
     keep(ORIGIN, i, p.path.origin, floatBitsToUint(p.path.bsdf_pdf));
@@ -57,13 +57,13 @@ void save_path(uint i, PathState p, Departure d) {
     keep(INDIRECT_LIGHT, i, p.light.indirect, 0u);
     save_hit(i, p.hit);
     if (FX_SPLIT) keep(ALBEDO, i, p.albedo, floatBitsToUint(p.share));
-    if (FX_SOFT) keep(SOFT_LIGHT, i, p.light.soft, floatBitsToUint(d.certainty));
+    if (FX_SOFT) keep(SOFT_LIGHT, i, p.light.soft, floatBitsToUint(d.kept));
 }
 
 // All of the path but `sharp_only`. Of its departure it sets what is read once the rays are traced: the sampled light and the flags.
 PathState saved_path(uint i, out Departure d) {
     PathState p;
-    uint pdf, scale, state, t, certainty = 0u;
+    uint pdf, scale, state, t, kept_share = 0u;
     p.path.origin = kept(ORIGIN, i, pdf);
     p.path.direction = kept(DIRECTION, i, scale);
     p.path.throughput = kept(THROUGHPUT, i, state);
@@ -74,7 +74,7 @@ PathState saved_path(uint i, out Departure d) {
     p.bounce = state >> BOUNCE_AT;
     p.light.direct = kept(DIRECT_LIGHT, i, p.closest_rays);
     p.light.indirect = kept(INDIRECT_LIGHT, i, t);
-    p.light.soft = FX_SOFT ? kept(SOFT_LIGHT, i, certainty) : vec3(0.0);
+    p.light.soft = FX_SOFT ? kept(SOFT_LIGHT, i, kept_share) : vec3(0.0);
     p.passed_over = (state & PASSED) != 0u;
     uint share = floatBitsToUint(1.0);
     p.albedo = FX_SPLIT ? kept(ALBEDO, i, share) : vec3(0.0);
@@ -85,8 +85,7 @@ PathState saved_path(uint i, out Departure d) {
     d.sampled = kept(SAMPLED, i, p.any_rays);
     d.shadowed = (state & SHADOWED) != 0u;
     d.alive = (state & ALIVE) != 0u;
-    d.key = (state & KEY) != 0u;
-    d.certainty = uintBitsToFloat(certainty);
+    d.kept = uintBitsToFloat(kept_share);
     return p;
 }
 

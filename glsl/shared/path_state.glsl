@@ -63,7 +63,7 @@ struct Departure {
     bool shadowed;
     float certainty; // the probability that it was chosen, if it brings sharp shadows; else 0
     uint chosen;     // its index
-    bool key;         // whether it is the key light
+    float kept;      // with FX_SOFT the share of `sampled` that is kept apart: 0 but for the key light
     bool passed_over; // whether there is a key light, and it is not that
     bool alive;
 };
@@ -84,7 +84,7 @@ Segment next_segment(PathState p) {
 // paths chose it: of paths that choose another nothing is noted (PASSED_OVER). Only what the choice adds to it is noisy.
 void add_sampled(inout PathState p, Departure d, vec3 sampled, bool lit) {
     vec3 light = lit ? sampled : vec3(0.0);
-    float kept = FX_SOFT && d.key && p.scattered == 1u ? d.certainty : 0.0;
+    float kept = FX_SOFT && p.scattered == 1u ? d.kept : 0.0;
     add_light(p.light, kept * light, DIRECT);
     add_light(p.light, (1.0 - kept) * light, kind_of_light(p.scattered, p.share < 1.0));
 }

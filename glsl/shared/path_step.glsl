@@ -61,8 +61,8 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, View view, Sampler random, uint pair, 
     LightSample light = light_sample(receiver_of(s, bsdf, view), word, sample_2d(random, pair + PAIR_LIGHT));
     d.certainty = light.sharp;
     d.chosen = light.chosen;
-    d.key = light.key != NONE && light.chosen == light.key;
-    d.passed_over = light.key != NONE && !d.key;
+    d.kept = light.chosen == light.key ? light.kept * light.sharp : 0.0;
+    d.passed_over = light.kept > 0.0 && light.chosen != light.key;
     vec3 wi = light.direction * view.basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, view.wo, wi);
     f.rgb *= light_share(s, view.facing, light.direction, wi.z);
@@ -136,7 +136,7 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     p.scattered += smooth_here ? 0u : 1u;
     // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for the key light there.
     bool ends = FX_SPARSE && p.sharp_only && p.scattered > (FX_SOFT ? 0u : 1u);
-    d.shadowed = d.shadowed && (!ends || (FX_SOFT && d.key));
+    d.shadowed = d.shadowed && (!ends || (FX_SOFT && d.kept > 0.0));
     d.alive = d.alive && !ends;
     bool roulette = FX_ROULETTE && push.constants.roulette_depth > 0u && p.bounce + 1u >= push.constants.roulette_depth;
     if (roulette) d.alive = survives_roulette(p.path, random, pair) && d.alive;

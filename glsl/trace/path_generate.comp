@@ -15,7 +15,7 @@ void main() {
     uint i = thread_path(on), pixel, index;
     if (!on) return;
     Departure d;
-    d.shadowed = d.key = false;
+    d.shadowed = false;
     d.shadow = Segment(vec3(0.0), vec3(0.0), 0.0, 0u);
     d.sampled = vec3(0.0);
     d.alive = find_path(i, pixel, index);

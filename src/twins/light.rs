@@ -29,8 +29,10 @@ pub struct LightSample {
     pub sharp: f32,
     /// Index of the light; [`NONE`] if none can bring anything.
     pub chosen: u32,
-    /// That of the key light of the point, or [`NONE`].
+    /// That of the key light of the point, if anything of it is kept apart; else [`NONE`].
     pub key: u32,
+    /// The share that is kept of the key light.
+    pub kept: f32,
 }
 
 pub use crate::shaders::shared::segment::INFINITE_DISTANCE;
@@ -105,7 +107,7 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
         }
     };
     let radiance = if pdf > 0.0 { radiance / pdf } else { Vec3::ZERO };
-    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, sharp: 0.0, chosen: 0, key: NONE }
+    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, sharp: 0.0, chosen: 0, key: NONE, kept: 0.0 }
 }
 
 /// A triangle seen from a point: unit vectors to its corners, and its solid angle in steradians.
@@ -201,6 +203,7 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
         sharp: 0.0,
         chosen: 0,
         key: NONE,
+        kept: 0.0,
     }
 }
 
@@ -237,6 +240,7 @@ fn sample_sphere_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightS
         sharp: 0.0,
         chosen: 0,
         key: NONE,
+        kept: 0.0,
     }
 }
 
@@ -262,8 +266,11 @@ fn choose_by_share(scene: &Scene, r: &Receiver, u: f32, key: &mut KeyLight) -> (
     let probability: f32 = group.iter().map(|(_, light, _)| light.probability).sum();
     let lit = || group.iter().filter(|(.., brings)| *brings > 0.0);
     let (sum, number) = (lit().map(|(.., brings)| brings).sum::<f32>(), lit().count() as f32);
-    for &(index, _, brings) in lit() {
-        key.consider(index, probability * mixed(brings / sum, number));
+    let mut likely: Vec<_> = lit().map(|&(i, _, brings)| (probability * mixed(brings / sum, number), i)).collect();
+    likely.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    if probability > key.probability {
+        let (likeliest, index) = likely.first().copied().unwrap_or((0.0, NONE));
+        *key = KeyLight { index, probability: likeliest, rival: likely.get(1).map_or(0.0, |(next, _)| *next) };
     }
     let (mut before, mut chosen) = (0.0, (Light { probability, value: [0.0; 3], ..scene.lights[0] }, NONE));
     for &(index, light, brings) in lit() {
@@ -291,7 +298,7 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     if light.kind == LIGHT_SPOT {
         radiance *= spot_share(light, direction);
     }
-    LightSample { direction, distance, radiance, pdf: 0.0, sharp: light.probability, chosen: 0, key: NONE }
+    LightSample { direction, distance, radiance, pdf: 0.0, sharp: light.probability, chosen: 0, key: NONE, kept: 0.0 }
 }
 
 /// Density over area by which MIS takes a lamp to be chosen.
@@ -344,6 +351,7 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
             sharp: light.probability,
             chosen: 0,
             key: NONE,
+            kept: 0.0,
         },
         _ => sample_environment(scene, &light, rest, u),
     };
@@ -352,7 +360,9 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         let density = lamp_density(scene, light.material, brightness);
         sample.pdf = nominal_pdf(scene, density, light.probability / sample.pdf, p);
     }
-    (sample.chosen, sample.key) = (if by_tree && probability == 0.0 { NONE } else { index }, key.index);
+    sample.chosen = if by_tree && probability == 0.0 { NONE } else { index };
+    sample.kept = key.kept_share();
+    sample.key = if sample.kept > 0.0 { key.index } else { NONE };
     if by_tree && probability == 0.0 {
         sample.radiance = Vec3::ZERO;
     }

@@ -52,24 +52,35 @@ impl Receiver {
     }
 }
 
-/// The light without extent that a point chooses most often, if it does so more often than [`KEY_PROBABILITY`]; else index [`NONE`].
+/// The light without extent that a point chooses most often.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyLight {
-    /// Index of the light.
+    /// Index of the light; [`NONE`] without one.
     pub index: u32,
     /// Probability of the choice.
     pub probability: f32,
+    /// That of the likeliest other light that may be the key light elsewhere; 0 without one.
+    pub rival: f32,
 }
 
 impl KeyLight {
     /// That of a point none of whose lights has been considered.
-    pub const NONE: Self = Self { index: NONE, probability: KEY_PROBABILITY };
+    pub const NONE: Self = Self { index: NONE, probability: 0.0, rival: 0.0 };
 
-    /// Takes a light without extent for it, if that is chosen more often than those before.
+    /// Takes a light without extent, chosen as often everywhere, for it, if it is chosen more often than those before.
     pub fn consider(&mut self, index: u32, probability: f32) {
         if probability > self.probability {
-            *self = Self { index, probability };
+            *self = Self { index, probability, rival: 0.0 };
         }
+    }
+
+    /// The share of its light that is kept apart, 0 to 1: 0 where another light becomes the key light.
+    pub fn kept_share(&self) -> f32 {
+        if self.probability <= KEY_PROBABILITY {
+            return 0.0;
+        }
+        let rival = self.rival / self.probability;
+        (self.probability / KEY_PROBABILITY - 1.0).min(1.0) * (1.0 - rival * rival)
     }
 }
 

@@ -82,14 +82,10 @@ struct SampledLight {
     sharp: f32,
     /// Index of the light.
     chosen: u32,
-    /// That of the key light.
-    key: u32,
-}
-
-impl SampledLight {
-    fn is_key(&self) -> bool {
-        self.key != NONE && self.chosen == self.key
-    }
+    /// The share of it that is kept apart; 0 but for the key light.
+    kept: f32,
+    /// Whether there is a key light, and it is not this.
+    passed_over: bool,
 }
 
 /// As `kind_of_light` of the kernel.
@@ -249,7 +245,10 @@ impl Tracer<'_> {
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
         let light =
             light_sample(self.scene, &receiver_of(s, &p.bsdf, &p.view), word, sample_2d(random, p.pair + PAIR_LIGHT));
-        let none = SampledLight { brought: None, sharp: light.sharp, chosen: light.chosen, key: light.key };
+        let LightSample { sharp, chosen, .. } = light;
+        let (is_key, soft) = (chosen == light.key, self.effects.soft_light && light.kept > 0.0);
+        let kept = if soft && is_key { light.kept * sharp } else { 0.0 };
+        let none = SampledLight { brought: None, sharp, chosen, kept, passed_over: soft && !is_key };
         if light.radiance == Vec3::ZERO {
             return none;
         }
@@ -335,16 +334,15 @@ impl Tracer<'_> {
             }
             let p = self.shade(s, path.direction, pair, from);
             seen.note(&p, path.throughput);
-            let soft = self.effects.soft_light;
-            let ends = sharp_only && seen.scattered > u32::from(!soft);
+            let ends = sharp_only && seen.scattered > u32::from(!self.effects.soft_light);
             if self.frame.path.light_count > 0 && !bsdf_is_delta(&p.bsdf) {
                 let sampled = self.light_from_nee(&p, random, mask_seed(seed, 2 * bounce + 1));
-                let (is_key, first) = (soft && sampled.is_key(), seen.scattered == 1);
-                let brought = sampled.brought.filter(|_| !ends || is_key);
+                let first = seen.scattered == 1;
+                let brought = sampled.brought.filter(|_| !ends || sampled.kept > 0.0);
                 rays += u32::from(brought.is_some());
                 let light = path.throughput * brought.unwrap_or_default();
-                self.add_sampled(&mut sum, &seen, light, if is_key && first { sampled.sharp } else { 0.0 });
-                passed_over |= first && soft && sampled.key != NONE && !is_key;
+                self.add_sampled(&mut sum, &seen, light, if first { sampled.kept } else { 0.0 });
+                passed_over |= first && sampled.passed_over;
                 if first && choice == NONE && seen.share == 1.0 {
                     (certain, choice) = (sampled.sharp * light, sampled.chosen);
                 }

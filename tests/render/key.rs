@@ -8,6 +8,7 @@ use tallow::gpu::Gpu;
 use tallow::layout::{Guide, PixelLight};
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
+use tallow::shaders::shared::light::EVEN_SHARE;
 use tallow::shaders::shared::sample_marks::ALL_PASSED_OVER;
 
 const ALBEDO: f32 = 0.5;
@@ -16,7 +17,7 @@ const BULBS: [([f32; 3], f32); 2] = [([-0.8, 0.8, 0.0], 1.0), ([0.8, 0.8, 0.2], 
 
 fn two_bulbs(spp: u32) -> Loaded {
     let mut text = format!(
-        "[film]\nwidth = 40\nheight = 31\n[camera]\nposition = [0.0, 3.0, 0.5]\ntarget = [0.0, 0.0, 0.0]\nfov = 50.0\n\
+        "[film]\nwidth = 80\nheight = 61\n[camera]\nposition = [0.0, 3.0, 0.5]\ntarget = [0.0, 0.0, 0.0]\nfov = 50.0\n\
          [render]\nspp = {spp}\nmax_depth = 2\n[[material]]\nname = 'floor'\ncolor = {ALBEDO}\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'floor'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 9.0 }}\n"
     );
@@ -38,6 +39,12 @@ fn brought(at: &Guide) -> [f32; 2] {
     each
 }
 
+/// The share of the stronger bulb's light that is kept, as both are chosen by what they bring.
+fn kept_share([key, other]: [f32; 2]) -> f32 {
+    let [key, other] = [key, other].map(|brings| (1.0 - EVEN_SHARE) * brings / (key + other) + 0.5 * EVEN_SHARE);
+    1.0 - (other / key).powi(2) // it is chosen at least half of the time
+}
+
 /// A render of so many samples: its light and guides, and what `auto` makes of it.
 fn rendered(gpu: &Gpu, spp: u32) -> (Vec<PixelLight>, Vec<Guide>, Vec<f32>) {
     let scene = two_bulbs(spp);
@@ -50,33 +57,34 @@ fn rendered(gpu: &Gpu, spp: u32) -> (Vec<PixelLight>, Vec<Guide>, Vec<f32>) {
 }
 
 /// Of two bulbs the stronger one at a place is chosen in proportion to what it brings, and so seldom as half of the time: direct light is
-/// what it brings, but for the spread of the samples over the pixel, wherever the other one is clearly weaker.
+/// a share of what it brings, but for the spread of the samples over the pixel. That share is 0 where both are alike, so that light has no
+/// step where another bulb becomes the stronger one.
 #[test]
 fn key_light_has_no_noise_of_the_choice_of_lights() {
     let gpu = gpu();
     let (light, guide, _) = rendered(&gpu, 4);
-    let mut compared = 0;
+    let mut small = 0;
     for (l, at) in light.iter().zip(&guide) {
-        let [key, other] = brought(at);
-        if key > 1.3 * other {
-            let off = l.direct[0] / key - 1.0;
-            assert!(
-                off.abs() < 0.12 && l.remainder == 0,
-                "{off} at {:?}, where the other has {}",
-                at.position,
-                other / key
-            );
-            compared += 1;
-        }
+        let both = brought(at);
+        let (share, kept) = (kept_share(both), l.direct[0] / both[0]);
+        // Where both are as likely, samples may take each for the key light, and all pass it over.
+        let known = l.remainder == 0 || share < 0.3;
+        let off = if l.remainder == 0 { kept - share } else { 0.0 };
+        assert!(
+            known && off.abs() < if share > 0.5 { 0.08 } else { 0.15 },
+            "{l:?} at {:?}, expected {share} of {both:?}",
+            at.position
+        );
+        small += usize::from(share < 0.3);
     }
-    assert!(compared > 900, "control: {compared} pixels");
+    assert!((150..900).contains(&small), "control: {small} pixels");
     // Of one sample, those that chose the other bulb know nothing.
     let (light, guide, _) = rendered(&gpu, 1);
     let passed_over = |l: &PixelLight| l.remainder == ALL_PASSED_OVER;
     let share = light.iter().filter(|l| passed_over(l)).count() as f32 / light.len() as f32;
     let weaker = |at: &Guide| {
         let [key, other] = brought(at);
-        0.95 * other / (key + other) + 0.025
+        (1.0 - EVEN_SHARE) * other / (key + other) + 0.5 * EVEN_SHARE
     };
     let expected = guide.iter().map(weaker).sum::<f32>() / guide.len() as f32;
     assert!((share - expected).abs() < 0.03, "{share} of the pixels pass over the key light, expected are {expected}");
@@ -89,7 +97,7 @@ fn key_light_has_no_noise_of_the_choice_of_lights() {
 #[test]
 fn floors_that_bulbs_light_have_no_grain_behind_a_filter() {
     let gpu = gpu();
-    for (spp, most) in [(1, 0.05), (4, 0.02)] {
+    for (spp, most) in [(1, 0.045), (4, 0.01)] {
         let (_, guide, clean) = rendered(&gpu, spp);
         let off = |(c, at): (&f32, &Guide)| (c / brought(at).iter().sum::<f32>() - 1.0).powi(2);
         let error = (clean.iter().zip(&guide).map(off).sum::<f32>() / clean.len() as f32).sqrt();

@@ -293,15 +293,41 @@ fn a_tree_draws_lights_with_their_probabilities() {
     }
 }
 
-/// The key light of a place is the same however the choice falls, and the light without extent that it falls on most often.
+/// The key light and the share that is kept of it, by how often each light was chosen.
+fn expected_key(scene: &Loaded, chosen: &[f32]) -> (u32, f32) {
+    let weighed = |i: &usize| scene.weighed_lights && scene.lights[*i].is_point_or_spot();
+    // Of lights that are as likely everywhere; the likeliest light of a tree is not known to those that go another way down.
+    let steady = |i: &usize| match scene.has_light_tree() {
+        true => scene.lights[*i].kind == LIGHT_DIRECTIONAL,
+        false => scene.lights[*i].is_delta() && !weighed(i),
+    };
+    let all = || 0..chosen.len();
+    let all_weighed: f32 = all().filter(weighed).map(|i| chosen[i]).sum();
+    let by_place = all_weighed > all().filter(steady).map(|i| chosen[i]).fold(0.0, f32::max);
+    let mut likely: Vec<_> = all().filter(|i| if by_place { weighed(i) } else { steady(i) }).collect();
+    likely.sort_by(|&a, &b| chosen[b].total_cmp(&chosen[a]));
+    let rival = if by_place && likely.len() > 1 { chosen[likely[1]] } else { 0.0 };
+    match likely.first() {
+        Some(&key) if chosen[key] > KEY_PROBABILITY => {
+            let often = (chosen[key] / KEY_PROBABILITY - 1.0).min(1.0);
+            (key as u32, often * (1.0 - (rival / chosen[key]).powi(2)))
+        }
+        _ => (NONE, 0.0),
+    }
+}
+
+/// The key light of a place is the same however the choice falls, and the light without extent that it falls on most often, of those that
+/// are weighed or of those that are as likely everywhere; of one that others rival less is kept.
 #[test]
 fn the_key_light_is_the_one_that_is_chosen_most_often() {
     let bulb = "[[light]]\ntype = 'point'\nposition = [0.3, 0.9, 0.1]\nintensity = 1.0\n";
     let sun = |irradiance: f32| {
         format!("[[light]]\ntype = 'directional'\ndirection = [0.5, -1.0, 0.2]\nirradiance = {irradiance}\n")
     };
-    let alone = Workplace::new().scene(&format!("[environment]\nradiance = 0.1\n{bulb}{}", sun(0.2)));
-    let (mut of_kinds, mut without) = ([0; 8], 0);
+    let sky = "[environment]\nradiance = 0.1\n";
+    let alone = Workplace::new().scene(&format!("{sky}{bulb}{}", sun(0.2)));
+    let few = Workplace::new().scene(&format!("{bulb}{}{}", bulb.replace("0.3", "-0.4"), sun(1.0)));
+    let (mut of_kinds, mut without, mut rivalled) = ([0; 8], 0, 0);
     for scene in [
         many_lamps(3),
         many_lamps(40),
@@ -309,6 +335,7 @@ fn the_key_light_is_the_one_that_is_chosen_most_often() {
         many_lamps_and(3, &sun(4.0)),
         many_lamps_and(40, &sun(4.0)),
         alone,
+        few,
     ] {
         for r in receivers() {
             let (mut chosen, mut keys) = (vec![0.0; scene.lights.len()], Vec::new());
@@ -316,22 +343,24 @@ fn the_key_light_is_the_one_that_is_chosen_most_often() {
                 let s = sampler_start(0, i, 1, false);
                 let light = light_sample(&scene, &r, sample_2d_bits(s, 0)[0], sample_2d(s, 1));
                 chosen[light.chosen as usize] += 1.0 / f32::from(1_u16 << 14);
-                keys.push(light.key);
+                keys.push((light.key, light.kept));
             }
-            let likeliest = (0..scene.lights.len()).filter(|&i| scene.lights[i].is_delta());
-            let likeliest = likeliest.max_by(|&a, &b| chosen[a].total_cmp(&chosen[b])).unwrap();
-            let share = chosen[likeliest];
-            assert!((share - KEY_PROBABILITY).abs() > 0.01, "control: {share} decides nothing");
-            let expected = if share > KEY_PROBABILITY { likeliest as u32 } else { NONE };
-            assert!(keys.iter().all(|&key| key == expected), "{share}: {expected}, but {:?}", keys[0]);
-            match share > KEY_PROBABILITY {
-                true => of_kinds[scene.lights[likeliest].kind as usize] += 1,
-                false => without += 1,
+            let (key, kept) = expected_key(&scene, &chosen);
+            assert!(
+                chosen.iter().all(|share| (share - KEY_PROBABILITY).abs() > 0.01),
+                "control: {chosen:?} decide nothing"
+            );
+            let as_expected = |&(index, share): &(u32, f32)| index == key && (share - kept).abs() < 0.02;
+            assert!(keys.iter().all(as_expected), "{kept} of {key}, but {:?}: {chosen:?}", keys[0]);
+            rivalled += usize::from((0.1..0.9).contains(&kept));
+            match key {
+                NONE => without += 1,
+                key => of_kinds[scene.lights[key as usize].kind as usize] += 1,
             }
         }
     }
     let seen = [LIGHT_POINT, LIGHT_DIRECTIONAL].map(|kind| of_kinds[kind as usize]);
-    assert!(seen.iter().all(|&n| n > 3) && without > 3, "control: {of_kinds:?}, {without}");
+    assert!(seen.iter().all(|&n| n > 3) && without > 3 && rivalled > 3, "control: {of_kinds:?}, {without}, {rivalled}");
 }
 
 fn corners(i: u32, size: Vec3) -> [Vec3; 3] {

@@ -147,6 +147,14 @@ fn fireflies_are_cut_and_accounted_for() {
     assert_eq!((removed.pixels, removed.radiance[1].round()), (1, 7.0));
     assert!((removed.share - 7.0 / (120.0 + 4.0 * 8.0)).abs() < 1e-6, "{removed:?}");
     assert_eq!(firefly::removed(&before.radiance, &before.radiance).pixels, 0, "control: nothing was cut");
+    // Over a floor of -1, and where it is itself negative, it is the same share.
+    for (floor, lone) in [(-1.0, 9.0), (1.0, -9.0)] {
+        let change = |c: &vec4| if c[0] == 1.0 { [floor, floor, floor, 1.0] } else { [lone, lone, lone, 1.0] };
+        let mut input = FilterInput { radiance: before.radiance.iter().map(change).collect(), ..before.clone() };
+        let signed = firefly::remove_fireflies(&gpu, &mut input, 2.0).unwrap();
+        assert_eq!((signed.pixels, signed.share), (removed.pixels, removed.share), "{floor} {lone}: {signed:?}");
+        assert_eq!(signed.radiance[1].round(), 7.0 * f64::from(lone).signum());
+    }
     assert!(firefly::remove_fireflies(&gpu, &mut input, 0.5).is_err());
 
     // One sample has brought all of a pixel's light, whatever variance it tells; that of four without any is the light's own.
@@ -158,10 +166,11 @@ fn fireflies_are_cut_and_accounted_for() {
         assert_eq!([host, input.radiance[2 * 20 + 4][0]], [kept; 2], "{count} samples");
     }
 
-    // Fewer than two known neighbours are no company to judge by, nor are dark ones; light below 0 counts as none.
+    // Fewer than two known neighbours are no company to judge by, nor are dark ones; light below 0 counts by its size.
     let none = f32::NAN;
-    let rows = [([none, 9.0, none], 9.0), ([1.0, 9.0, none], 9.0), ([1.0, 9.0, 3.0], 2.0), ([-0.5, 9.0, -0.5], 9.0)];
-    for (values, kept) in rows {
+    let rows = [([none, 9.0, none], 9.0), ([1.0, 9.0, none], 9.0), ([1.0, 9.0, 3.0], 2.0), ([0.0, 9.0, 0.0], 9.0)];
+    let below_0 = [([-0.5, 9.0, -3.0], 1.0), ([-0.5, -9.0, 3.0], -1.0), ([0.0, -9.0, 0.0], -9.0)];
+    for (values, kept) in rows.into_iter().chain(below_0) {
         let mut input = line(&values);
         let host = firefly::reference(&input, 2.0).radiance;
         firefly::remove_fireflies(&gpu, &mut input, 2.0).unwrap();

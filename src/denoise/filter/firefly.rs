@@ -60,7 +60,8 @@ pub struct Removed {
     pub pixels: usize,
     /// Sum of the known radiance that was cut off, per channel.
     pub radiance: [f64; 3],
-    /// The same as a share of all the image's, over all channels; 0 for a black image.
+    /// Size of what was cut off over that of all the image's light, summed over pixels and channels without their signs; 0 for a black
+    /// image.
     pub share: f64,
 }
 
@@ -123,7 +124,7 @@ impl Cut {
 }
 
 /// Cuts the pixels of `input` that are more than `factor` (at least 1) times brighter than the second brightest of the 24 around
-/// them, most of which are lit, and where their variance is known, if one sample has brought their light.
+/// them, most of which are lit, and where their variance is known, if one sample has brought their light. Negative light counts by its size.
 ///
 /// # Errors
 /// [`Error::Usage`] for a factor below 1 or planes of wrong sizes, [`Error::Device`] when the device fails.
@@ -150,6 +151,8 @@ pub fn removed(before: &[vec4], after: &[vec4]) -> Removed {
 struct Tally {
     pixels: usize,
     radiance: [f64; 3],
+    /// Over all channels, without their signs: what was cut, and what there was.
+    cut: f64,
     all: f64,
 }
 
@@ -158,14 +161,18 @@ impl Tally {
         for (before, after) in before.iter().zip(after) {
             let Some(before) = known_radiance(*before) else { continue };
             self.pixels += usize::from(before.to_array() != after[..3]);
-            (0..3).for_each(|c| self.radiance[c] += f64::from(before[c]) - f64::from(after[c]));
-            self.all += before.as_dvec3().element_sum();
+            for c in 0..3 {
+                let cut = f64::from(before[c]) - f64::from(after[c]);
+                self.radiance[c] += cut;
+                self.cut += cut.abs();
+            }
+            self.all += before.as_dvec3().abs().element_sum();
         }
     }
 
     fn removed(self) -> Removed {
-        let Self { pixels, radiance, all } = self;
-        let share = if all > 0.0 { radiance.iter().sum::<f64>() / all } else { 0.0 };
+        let Self { pixels, radiance, cut, all } = self;
+        let share = if all > 0.0 { cut / all } else { 0.0 };
         Removed { pixels, radiance, share }
     }
 }
@@ -180,7 +187,7 @@ pub fn reference(input: &FilterInput, factor: f32) -> FilterInput {
         };
         let around = around(input, at);
         let lit = around.iter().filter(|v| **v > 0.0).count();
-        let (bright, most) = (luminance(here), around.get(1).map_or(f32::INFINITY, |second| factor * second));
+        let (bright, most) = (luminance(here).abs(), around.get(1).map_or(f32::INFINITY, |second| factor * second));
         let outlier = 2 * lit > around.len() && bright > most && dominated(input, at, bright);
         let kept = if outlier { most / bright } else { 1.0 };
         cut.radiance[at] = (here * kept).extend(radiance[3]).into();
@@ -189,7 +196,7 @@ pub fn reference(input: &FilterInput, factor: f32) -> FilterInput {
     cut
 }
 
-/// Luminances of the known pixels around one, the brightest first.
+/// Sizes of the luminances of the known pixels around one, the largest first.
 fn around(input: &FilterInput, at: usize) -> Vec<f32> {
     let (width, height) = (i64::from(input.width), i64::from(input.height));
     let at = at as i64;
@@ -197,7 +204,7 @@ fn around(input: &FilterInput, at: usize) -> Vec<f32> {
         .map(|i| (at % width + i % 5 - 2, at / width + i / 5 - 2))
         .filter(|&(u, v)| (0..width).contains(&u) && (0..height).contains(&v) && v * width + u != at)
         .filter_map(|(u, v)| known_radiance(input.radiance[(v * width + u) as usize]))
-        .map(|c| luminance(c).max(0.0))
+        .map(|c| luminance(c).abs())
         .collect();
     around.sort_by(|a, b| b.total_cmp(a));
     around

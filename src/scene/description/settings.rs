@@ -50,8 +50,8 @@ choices! {
         /// `indirect` holds light of two bounces and more, over the albedo of what is seen first.
         Indirect,
         /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what the point,
-        /// spot or directional light brings that a place chooses most often, in more than 40 % of the choices: its shadows are sharp, and its
-        /// noise is that of what edges and masks hide.
+        /// spot or directional light brings that a place chooses most often, whose shadows are sharp, and whose noise is that of what edges
+        /// and masks hide: all of it from 40 % of the choices on, none up to 20 %, and less where another lamp is about as likely.
         #[default]
         Soft,
     }
