@@ -276,6 +276,46 @@ fn without_frames_all_of_the_animation_is_rendered() {
     );
 }
 
+/// A pose at a key is that of all times where there is no other, and keys may lie after all frames, before them, or between two of them.
+#[test]
+fn frames_that_no_key_moves_are_told() {
+    let folder = stage();
+    let key = |time: f64| format!("{{ time = {time}, position = [{time}, 0, 9] }}");
+    let told = |times: &[f64], more: &str, words: &str| {
+        let keys = times.iter().map(|&time| key(time)).collect::<Vec<_>>().join(", ");
+        let scene =
+            format!("[environment]\n[[mesh]]\nshape = 'cube'\n[[animation]]\ncamera = true\nkeys = [{keys}]\n{more}");
+        fs::write(folder.path().join("s.toml"), scene).unwrap();
+        let output = run(&folder, &format!("--fps 2 -o n.#.png {words}"));
+        let line = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && line.lines().count() <= 1, "{line}");
+        line
+    };
+    let one = told(&[5.0], "", "--frames 0..2");
+    assert!(
+        one.contains("all frames are alike: what moves has no second key to move to, and its last is at 5 s"),
+        "{one}"
+    );
+    let later = told(&[5.0, 6.0], "", "--frames 0..2");
+    assert!(later.contains("all frames are alike: they are from 0 s to 0.5 s, and keys from 5 s to 6 s"), "{later}");
+    let before = told(&[0.0, 1.0], "", "--frames 2..4");
+    assert!(
+        before.contains("they are from 1 s to 1.5 s, and keys from 0 s to 1 s (choose others by --frames"),
+        "{before}"
+    );
+    for (times, more, words) in [
+        (&[0.0, 1.0][..], "", "--frames 1..3"),
+        (&[0.0, 1.0], "repeat = true\n", "--frames 3..5"),
+        (&[0.5, 1.0], "", "--frames 1..3"),
+        // A frame alone is what was asked for, and a turntable moves.
+        (&[5.0, 6.0], "", "--frames 7"),
+        (&[5.0], "", "--frames 0..2 --turntable 90"),
+    ] {
+        let line = told(times, more, words);
+        assert!(!line.contains("alike"), "{words}: {line}");
+    }
+}
+
 /// Seconds are whole numbers here, so that angles have the same bits.
 #[test]
 fn a_turn_is_over_all_frames_whichever_is_the_first() {

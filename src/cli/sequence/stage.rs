@@ -68,14 +68,8 @@ impl<'a> Stage<'a> {
             animation.movers.push(Arc::new(Turntable::new(&scene, settings.size(), degrees, span)));
         }
         warnings.add(scene.warnings.clone());
-        let still = if animation.is_empty() {
-            Some("nothing moves in the scene (add [[animation]] tables, or --turntable)")
-        } else if animation.end() == 0.0 {
-            Some("what moves has no key after time 0 (give later keys, another --clip, or --turntable)")
-        } else {
-            None
-        };
-        warnings.add(still.map(|why| format!("all frames are alike: {why}")));
+        let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
+        warnings.add(survey.why_still().map(|why| format!("all frames are alike: {why}")));
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(args.render.filter(&settings), &settings, &gpu)?;
         render::check_stride(&args.render, &settings, warnings)?;

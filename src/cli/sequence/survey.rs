@@ -57,6 +57,33 @@ impl Survey<'_> {
         cameras.any(|camera| Some(camera) != first)
     }
 
+    /// Why all frames are alike, where keys show that they are. A frame alone is like no other.
+    pub fn why_still(&self) -> Option<String> {
+        let times @ [first, last] = [self.frames.start, self.frames.end - 1].map(|number| self.seconds(number));
+        // Milliseconds are enough to find a key by.
+        let short = |seconds: f64| (seconds * 1e3).round() / 1e3;
+        match self.animation.moving() {
+            _ if self.animation.is_empty() => {
+                Some("nothing moves in the scene (add [[animation]] tables, or --turntable)".to_owned())
+            }
+            _ if self.animation.end() == 0.0 => {
+                Some("what moves has no key after time 0 (give later keys, another --clip, or --turntable)".to_owned())
+            }
+            None => Some(format!(
+                "what moves has no second key to move to, and its last is at {} s (give more keys, another --clip, or --turntable)",
+                short(self.animation.end())
+            )),
+            Some(span) if self.frames.len() > 1 && !self.animation.moves_between(times) => Some(format!(
+                "they are from {} s to {} s, and keys from {} s to {} s (choose others by --frames or --fps)",
+                short(first),
+                short(last),
+                short(span.start),
+                short(span.end)
+            )),
+            Some(_) => None,
+        }
+    }
+
     /// What surfaces reach in all frames, where some move and the camera has no place of its own.
     pub fn bounds(&self) -> Option<Bounds> {
         let keyed = self.animation.at(self.seconds(self.frames.start)).ok().and_then(|pose| pose.camera);

@@ -3,6 +3,7 @@ use super::time::{reaches, within};
 use crate::error::Checked;
 use crate::scene::description::Interpolation;
 use glam::DQuat;
+use std::ops::Range;
 
 /// Keys in the order of their times, and what lies between them.
 #[derive(Clone, Debug)]
@@ -49,6 +50,13 @@ impl Curve {
         self.times.last().copied().unwrap_or(0.0)
     }
 
+    /// From the first key to the last, between which values change, or always where it repeats; none where there is one key.
+    pub fn moving(&self) -> Option<Range<f64>> {
+        let (first, last) = (self.times.first()?, self.times.last()?);
+        let span = if self.period.is_some() { f64::NEG_INFINITY..f64::INFINITY } else { *first..*last };
+        (self.times.len() > 1).then_some(span)
+    }
+
     /// The value at a time; before the first and after the last key, theirs.
     pub fn at(&self, seconds: f64) -> Vec<f64> {
         let seconds = self.period.map_or(seconds, |period| within(seconds, period));
@@ -86,6 +94,9 @@ mod tests {
         assert_eq!([0.0, 2.9, 3.0].map(|t| steps.at(t)[0]), [10.0, 10.0, 20.0]);
         let again = curve(&[(0.0, 0.0), (2.0, 8.0)], Interpolation::Linear).unwrap().repeated(2.0);
         assert_eq!([0.5, 2.5, 21.0, -0.5].map(|t| again.at(t)[0]), [2.0, 2.0, 4.0, 6.0]);
+        let alone = curve(&[(5.0, 1.0)], Interpolation::Linear).unwrap().repeated(5.0);
+        let always = f64::NEG_INFINITY..f64::INFINITY;
+        assert_eq!([line, again, alone].map(|c| c.moving()), [Some(1.0..3.0), Some(always), None]);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::scene::load::library::Library;
 use crate::scene::load::mesh_file;
 use crate::scene::load::obj_part::Numbering;
 use crate::scene::pose::{Pose, Vertices};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -129,5 +130,10 @@ impl Mover for Frames {
 
     fn end(&self) -> f64 {
         f64::from(self.count - 1) / self.fps
+    }
+
+    fn moving(&self) -> Option<Range<f64>> {
+        let span = if self.repeat { f64::NEG_INFINITY..f64::INFINITY } else { 0.0..self.end() };
+        (self.count > 1).then_some(span)
     }
 }

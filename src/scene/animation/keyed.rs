@@ -1,10 +1,12 @@
 //! Things that keys move.
 use super::Mover;
 use super::curve::Curve;
+use super::time::hull;
 use crate::error::Result;
 use crate::scene::description::{Camera, LightTable, LightType, Rgb, Transform, affine};
 use crate::scene::pose::{EnvironmentChange, MaterialChange, Pose};
 use glam::{DQuat, DVec3};
+use std::ops::Range;
 
 /// A thing that keys move: what it is where no key says otherwise, and its number.
 #[derive(Clone, Debug)]
@@ -167,5 +169,9 @@ impl Mover for Keyed {
 
     fn end(&self) -> f64 {
         self.curves.iter().map(|(_, curve)| curve.end()).fold(0.0, f64::max)
+    }
+
+    fn moving(&self) -> Option<Range<f64>> {
+        hull(self.curves.iter().filter_map(|(_, curve)| curve.moving()))
     }
 }

@@ -11,6 +11,7 @@ use crate::error::Result;
 pub(super) use keyed::Keyed;
 pub(super) use load::{load, of_node, with_freed_meshes};
 use std::fmt::Debug;
+use std::ops::Range;
 use std::sync::Arc;
 pub use turntable::Turntable;
 
@@ -31,6 +32,12 @@ pub trait Mover: Debug + Send + Sync {
 
     /// Seconds from the start to the last key, 0 or more.
     fn end(&self) -> f64;
+
+    /// Seconds between which it moves: before them and after them all is as it is at their ends. None where it never moves, as by one
+    /// key alone, whenever that is.
+    fn moving(&self) -> Option<Range<f64>> {
+        (self.end() > 0.0).then_some(0.0..f64::INFINITY)
+    }
 }
 
 /// All that moves a scene.
@@ -55,6 +62,17 @@ impl Animation {
     /// Seconds until the last key of all.
     pub fn end(&self) -> f64 {
         self.movers.iter().map(|mover| mover.end()).fold(0.0, f64::max)
+    }
+
+    /// Seconds from the begin of all motion to its end; none where nothing moves at any time. See [`Mover::moving`].
+    pub fn moving(&self) -> Option<Range<f64>> {
+        time::hull(self.movers.iter().filter_map(|mover| mover.moving()))
+    }
+
+    /// Whether anything moves between two times in seconds, the first of which is the earlier.
+    pub fn moves_between(&self, [first, last]: [f64; 2]) -> bool {
+        let meets = |span: Range<f64>| !time::reaches(span.start, last) && !time::reaches(first, span.end);
+        self.movers.iter().filter_map(|mover| mover.moving()).any(meets)
     }
 
     /// Number of the last frame that is not after the last key of all.

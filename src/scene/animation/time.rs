@@ -1,4 +1,5 @@
 //! Times of frames beside those of keys.
+use std::ops::Range;
 
 /// Seconds by which times may miss a key, and that relative to times above one second: files hold keys in single precision, frame n is
 /// at n / fps, and neither is a whole number of bits.
@@ -13,6 +14,11 @@ pub fn reaches(seconds: f64, key: f64) -> bool {
 pub fn within(seconds: f64, period: f64) -> f64 {
     let rest = seconds.rem_euclid(period);
     if rest.min(period - rest) <= SLACK * seconds.abs().max(1.0) { 0.0 } else { rest }
+}
+
+/// From the first begin to the last end.
+pub fn hull(spans: impl Iterator<Item = Range<f64>>) -> Option<Range<f64>> {
+    spans.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end))
 }
 
 #[cfg(test)]

@@ -74,6 +74,10 @@ impl Mover for Turntable {
     fn end(&self) -> f64 {
         self.span.end
     }
+
+    fn moving(&self) -> Option<Range<f64>> {
+        Some(f64::NEG_INFINITY..f64::INFINITY)
+    }
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use crate::scene::pose::Pose;
 use glam::{DAffine3, Vec3};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -222,5 +223,9 @@ impl Mover for Within {
 
     fn end(&self) -> f64 {
         self.mover.end()
+    }
+
+    fn moving(&self) -> Option<Range<f64>> {
+        self.mover.moving()
     }
 }

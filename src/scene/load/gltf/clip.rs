@@ -8,6 +8,7 @@ use glam::{DQuat, DVec3};
 use gltf_json::animation::{Animation, Channel as Json, Property};
 use gltf_json::validation::Checked;
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A part of a node that moves.
@@ -28,6 +29,11 @@ impl Channel {
     /// Time of the last key in seconds.
     pub fn end(&self) -> f64 {
         self.curve.end()
+    }
+
+    /// Seconds between which it moves, if it does.
+    pub fn moving(&self) -> Option<Range<f64>> {
+        self.curve.moving()
     }
 
     /// The weights at a time.

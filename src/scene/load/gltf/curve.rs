@@ -7,6 +7,7 @@ use crate::scene::animation::time::reaches;
 use glam::DQuat;
 use gltf_json::animation::{Interpolation, Sampler};
 use gltf_json::validation::Checked;
+use std::ops::Range;
 
 /// Keys in the order of their times.
 #[derive(Debug)]
@@ -80,6 +81,12 @@ impl Curve {
     /// Time of the last key in seconds.
     pub fn end(&self) -> f64 {
         self.times.last().copied().map_or(0.0, f64::from)
+    }
+
+    /// From the first key to the last, between which values change; none where there is one key.
+    pub fn moving(&self) -> Option<Range<f64>> {
+        let [first, .., last] = self.times[..] else { return None };
+        Some(f64::from(first)..f64::from(last))
     }
 
     /// The value at a time; before the first and after the last key, theirs. Quaternions are of length 1 unless they vanish.

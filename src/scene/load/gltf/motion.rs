@@ -5,11 +5,12 @@ use super::light;
 use super::node::{Local, Tree};
 use super::primitive::Primitive;
 use crate::error::Result;
-use crate::scene::animation::{Keyed, Mover};
+use crate::scene::animation::{Keyed, Mover, time::hull};
 use crate::scene::description::{Camera, LightTable, Mesh, Transform};
 use crate::scene::pose::{Pose, Vertices};
 use glam::{DAffine3, DMat4};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// An instance that a node moves.
@@ -104,6 +105,11 @@ impl Mover for Motion {
         let ends = self.channels.iter().map(Channel::end).chain(self.keyed.iter().map(|(_, keys)| keys.end()));
         ends.fold(0.0, f64::max)
     }
+
+    fn moving(&self) -> Option<Range<f64>> {
+        let keyed = self.keyed.iter().filter_map(|(_, keys)| keys.moving());
+        hull(self.channels.iter().filter_map(Channel::moving).chain(keyed))
+    }
 }
 
 /// A camera that a node moves.
@@ -127,5 +133,9 @@ impl Mover for CameraMotion {
 
     fn end(&self) -> f64 {
         self.motion.end()
+    }
+
+    fn moving(&self) -> Option<Range<f64>> {
+        self.motion.moving()
     }
 }
