@@ -10,7 +10,7 @@ use crate::threads;
 use animation::{Animation, Mover};
 use build::assemble::{Choices, assemble};
 use description::Description;
-use load::mesh_file::Format;
+use load::mesh_file::{self, Format};
 use load::{gltf, include};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -243,8 +243,9 @@ impl<'a> SceneFile<'a> {
             ("obj", _) | (_, Format::Ply) => (model(path), true),
             (other, _) => {
                 input::open(path)?; // a missing file is that first of all
-                let what = format!("is no scene: \"{other}\" is none of toml, obj, ply, ply.gz, gltf, glb");
-                return Err(Error::input(path, what));
+                let none = || format!("\"{other}\" is none of toml, obj, ply, ply.gz, gltf, glb");
+                let what = mesh_file::remedy(path).unwrap_or_else(none);
+                return Err(Error::input(path, format!("is no scene: {what}")));
             }
         };
         if let (Some(clip), false) = (clip, Format::of(path) == Format::Gltf) {

@@ -97,6 +97,13 @@ fn input_errors_name_the_file_and_exit_3() {
     assert!(read_by_a_job.stdout.is_empty(), "{read_by_a_job:?}");
     complains(&render("missing.blend"), 3, &["missing.blend: cannot be read: No such file"]);
     complains(&render("text.png"), 3, &["text.png", "is no scene", "toml, obj, ply, ply.gz, gltf, glb"]);
+    for ending in ["blend", "fbx", "usd", "usda", "usdc", "3ds", "dae", "FBX"] {
+        std::fs::write(folder.path().join(format!("s.{ending}")), "x").unwrap();
+        let export = format!("{} files are not read: export it to glTF (.glb) or OBJ", ending.to_lowercase());
+        complains(&render(&format!("s.{ending}")), 3, &[&format!("s.{ending}: is no scene: {export}")]);
+        std::fs::write(folder.path().join("m.toml"), format!("[[mesh]]\nfile = 's.{ending}'\n")).unwrap();
+        complains(&render("m.toml"), 3, &[&format!("s.{ending}: is no model: {export}")]);
+    }
     // Control: what is right gives no line.
     let good = compare("a.exr");
     assert_eq!((good.status.code(), good.stderr.len()), (Some(0), 0));
