@@ -6,8 +6,9 @@ use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error};
 use std::path::Path;
 
-/// Of a command line that clap refuses, what the word that it does not know stands for. `subcommand` is the one that was named.
-pub fn tip(e: &Error, subcommand: Option<&Command>) -> Option<String> {
+/// Of a command line that clap refuses, what the word that it does not know stands for. `all` has all commands, of which `subcommand` is
+/// the one that was named.
+pub fn tip(e: &Error, all: &Command, subcommand: Option<&Command>) -> Option<String> {
     let word = |kind| match e.get(kind) {
         Some(ContextValue::String(word)) => Some(word.as_str()),
         _ => None,
@@ -15,6 +16,7 @@ pub fn tip(e: &Error, subcommand: Option<&Command>) -> Option<String> {
     match (word(ContextKind::InvalidSubcommand), word(ContextKind::InvalidArg), subcommand) {
         (Some(word), ..) => of_command(word),
         (_, Some(word), Some(subcommand)) => of_option(word, subcommand),
+        (_, Some(word), None) => of_no_command(word, all),
         _ => None,
     }
 }
@@ -49,10 +51,9 @@ fn writes(command: &Command, name: &str) -> bool {
         }
 }
 
-/// Only such as the command has.
-fn of_option(word: &str, command: &Command) -> Option<String> {
-    let has = |name: &str| command.get_arguments().any(|arg| arg.get_long() == Some(name));
-    let here: &[&str] = match word {
+/// What an option of another program is called here; nothing for what none is known to have.
+fn called(word: &str) -> &'static [&'static str] {
+    match word {
         "--samples" | "--sample-count" | "--samples-per-pixel" => &["spp"],
         "--bounces" | "--max-bounces" | "--depth" | "--ray-depth" => &["max-depth"],
         "--size" | "--resolution" | "--res" | "--dimensions" => &["width", "height"],
@@ -60,11 +61,37 @@ fn of_option(word: &str, command: &Command) -> Option<String> {
         "--threshold" | "--tolerance" | "--max-error" => &["max-mse", "max-relmse", "max-flip", "min-psnr", "min-ssim"],
         "--time-limit" | "--timeout" | "--budget" => &["time"],
         "--start" | "--end" | "--start-frame" | "--end-frame" => &["frames"],
-        file if !file.starts_with('-') && writes(command, file) => {
-            return Some(format!("what is written is named by -o {}", quoted(file)));
-        }
-        _ => return None,
+        _ => &[],
+    }
+}
+
+fn has(command: &Command, name: &str) -> bool {
+    command.get_arguments().any(|arg| arg.get_long() == Some(name))
+}
+
+fn listed(names: &[&str]) -> String {
+    names.iter().map(|name| format!("--{name}")).collect::<Vec<_>>().join(", ")
+}
+
+/// Only such as the command has.
+fn of_option(word: &str, command: &Command) -> Option<String> {
+    if !word.starts_with('-') && writes(command, word) {
+        return Some(format!("what is written is named by -o {}", quoted(word)));
+    }
+    let here = called(word);
+    (!here.is_empty() && here.iter().all(|name| has(command, name))).then(|| format!("here that is {}", listed(here)))
+}
+
+/// Of an option that stands before any command, the first command that has it.
+fn of_no_command(word: &str, all: &Command) -> Option<String> {
+    let own = [word.strip_prefix("--").unwrap_or_default()];
+    let names = Some(called(word)).filter(|here| !here.is_empty()).unwrap_or(&own);
+    let short = word.strip_prefix('-').and_then(|rest| rest.chars().next());
+    let is_short = |command: &Command| command.get_arguments().any(|arg| short.is_some() && arg.get_short() == short);
+    let by_name = all.get_subcommands().find(|command| names.iter().all(|name| has(command, name)));
+    let (command, option) = match by_name {
+        Some(command) => (command, listed(names)),
+        None => (all.get_subcommands().find(|command| is_short(command))?, word.to_owned()),
     };
-    let names = here.iter().map(|name| format!("--{name}")).collect::<Vec<_>>().join(", ");
-    here.iter().all(|name| has(name)).then(|| format!("here that is {names}"))
+    Some(format!("a command comes first: tallow {} has {option}", command.get_name()))
 }

@@ -55,6 +55,10 @@ fn usage_errors_are_one_line_and_exit_2() {
         ("sequence s.toml f.#.png", "'f.#.png' found; tip: what is written is named by -o 'f.#.png' (see"),
         ("bench s.toml", "tip: here that is tallow profile (tallow cost for filters and policies) (see"),
         ("info", "tip: here that is tallow devices, or tallow explain for a scene (see"),
+        ("--samples 3", "'--samples' found; tip: a command comes first: tallow render has --spp (see tallow --help)"),
+        ("--spp=3 s.toml", "tip: a command comes first: tallow render has --spp (see"),
+        ("-o a.png s.toml", "'-o' found; tip: a command comes first: tallow render has -o (see"),
+        ("--frames 0..3 s.toml", "tip: a command comes first: tallow sequence has --frames (see"),
     ] {
         complains(&run(&words.split(' ').collect::<Vec<_>>()), 2, &[tip]);
     }
