@@ -1,5 +1,6 @@
 //! `tallow merge`: combines renders of the same picture with different samples into one.
 use super::common::Warnings;
+use super::files::key;
 use super::{Exit, complain, quoted};
 use crate::error::{Error, Result};
 use crate::image::{self, WriteOptions};
@@ -11,7 +12,7 @@ use std::path::PathBuf;
 /// The files must come from renders that differ in nothing but --first-sample and --spp, or in --seed. Means and
 /// variances are joined by the rule of Chan, Golub and LeVeque (1979): within rounding, the result is that of one render,
 /// and it has the same bits in whatever order the files are named. Where samples were spread evenly and their ranges close
-/// up, --resume goes on behind the last.
+/// up, --resume goes on behind the last. The output may be one of the files: it is replaced once the merged render is whole.
 #[derive(clap::Args)]
 pub struct Args {
     /// EXR files that tallow rendered
@@ -33,7 +34,12 @@ pub fn run(args: &Args) -> Result<Exit> {
         return Err(Error::Usage(format!("{name}: a merged render keeps all of its layers: choose a name with .exr")));
     }
     let Merged { film, gaps, filtered } = render::merge(&args.files)?;
+    let replaced = args.files.iter().find(|part| key(part) == key(&args.output));
     image::write(&args.output, &film, &WriteOptions::default())?;
+    if let Some(part) = replaced {
+        // Its samples are all in the merged render, so that nothing is lost, but the same command would not find the part again.
+        complain(&format!("note: {} was one of the parts: it holds all of them now", part.display()));
+    }
     let missing = |Gap { seed, first, last }| format!("samples {first} to {last} of seed {seed} are missing");
     Warnings::new(true).insist(gaps.into_iter().map(missing));
     if let Some((part, filter)) = filtered.first() {

@@ -1,5 +1,5 @@
 //! Tests which files `--resume` and `merge` accept, and their results.
-use crate::command::{complains, tallow};
+use crate::command::{complains, names, tallow};
 use std::process::Output;
 use tallow::image::{self, Film, Samples, Window};
 use tempfile::TempDir;
@@ -110,6 +110,29 @@ fn neither_believes_what_cannot_be() {
     write(&folder, "good.exr", &right);
     well(run(&folder, "merge good.exr b.exr -o merged.exr"));
     well(render(&folder, "--spp 4 --resume good.exr -o resumed.exr"));
+}
+
+/// As other tools replace their input; what cannot be written whole replaces nothing.
+#[test]
+fn a_part_that_the_merged_render_replaces_is_named_and_never_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    well(render(&folder, "--spp 2 -o a.exr"));
+    well(render(&folder, "--spp 2 --first-sample 2 -o b.exr"));
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    let before = bytes("b.exr");
+    #[cfg(target_os = "linux")]
+    {
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", "ulimit -f 1; exec \"$0\" merge a.exr b.exr -o ./b.exr", env!("CARGO_BIN_EXE_tallow")]);
+        complains(&shell.current_dir(folder.path()).output().unwrap(), 5, &["./b.exr", "free some space"]);
+        assert!(bytes("b.exr") == before && names(folder.path()) == ["a.exr", "b.exr"]);
+    }
+    well(run(&folder, "merge a.exr b.exr -o whole.exr"));
+    complains(&run(&folder, "merge a.exr b.exr -o ./b.exr"), 0, &["note: b.exr was one of the parts"]);
+    assert!(bytes("b.exr") == bytes("whole.exr") && bytes("b.exr") != before);
+    // The same command again finds samples that would count twice, and leaves the file as it is.
+    complains(&run(&folder, "merge a.exr b.exr -o b.exr"), 3, &["would count twice"]);
+    assert!(bytes("b.exr") == bytes("whole.exr"));
 }
 
 #[test]
