@@ -83,7 +83,7 @@ impl Camera {
             v if (0.0..=MAX_COORDINATE as f32).contains(&v) => Ok(v),
             v => Err(format!("{name} is {v}: choose 0 or a positive number of at most {:e}", MAX_COORDINATE)),
         };
-        let to_target = self.target.map_or(1.0, |t| (DVec3::from(t) - position).dot(forward).max(1e-6));
+        let to_target = self.target.map_or(1.0, |t| (DVec3::from(t) - position).dot(forward).max(LEAST_EDGE));
         let focus_distance = self.focus_distance.unwrap_or(to_target as f32);
         if !(focus_distance > 0.0 && focus_distance <= MAX_COORDINATE as f32) {
             return Err(format!(
@@ -168,7 +168,9 @@ fn overview(target: DVec3, low: DVec3, high: DVec3, tan: [f64; 2]) -> DVec3 {
         off.dot(back) + MARGIN * across
     };
     let corner = |k: u32| DVec3::from([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }));
-    let least = (high - low).length().max(1e-6) / 2.0;
+    let extent = (high - low).length();
+    // Where nothing has an extent, any distance will do.
+    let least = if extent > 0.0 { extent / 2.0 } else { 1e-6 };
     target + back * (0..8).map(|k| distance(corner(k) - target)).fold(least, f64::max)
 }
 
@@ -265,8 +267,13 @@ mod tests {
 
     #[test]
     fn a_camera_without_position_has_all_in_view_and_fills_the_film() {
-        for (size, high) in [([200, 100], [1.0, 1.0, 9.0]), ([100, 200], [5.0, 1.0, 1.0]), ([64, 64], [1.0, 1.0, 1.0])]
-        {
+        for (size, high) in [
+            ([200, 100], [1.0, 1.0, 9.0]),
+            ([100, 200], [5.0, 1.0, 1.0]),
+            ([64, 64], [1.0, 1.0, 1.0]),
+            ([64, 64], [1e-8, 1e-8, 1e-8]),
+            ([64, 64], [1e8, 1e8, 1e8]),
+        ] {
             let bounds = [[-high[0], -high[1], -high[2]], high];
             let found = Camera::default().build(size, bounds).unwrap();
             let [position, right, up, forward] =
