@@ -405,6 +405,46 @@ fn pictures_of_emission_too_bright_for_their_texels_are_told() {
     assert!(said.len() == 1 && said[0].contains("lamp.exr: clamped to 6.5408e4"), "{said:?}");
 }
 
+/// A picture of floats may have numbers that its use has not: damage, ringing of a filter, and normals that were not moved to [0, 1].
+#[test]
+fn pictures_of_numbers_that_their_use_has_not_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |key: &str, odd: f32| {
+        let mut film = Film::new(2, 1);
+        film.add_vec3("", ["R", "G", "B"], &[[odd, odd, 0.5], [0.5; 3]]);
+        write(&folder.path().join("p.exr"), &film, &WriteOptions::default()).unwrap();
+        let text = format!(
+            "[environment]\n[[material]]\nname = 'a'\n{key} = 'p.exr'\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'a'\n"
+        );
+        Scene::parse(&folder.path().join("scene.toml"), &text).unwrap().scene.warnings
+    };
+    for (key, odd, told) in [
+        ("color_texture", f32::NAN, "lie outside [0, 1] or are NaN: clamped"),
+        ("color_texture", f32::INFINITY, "lie outside [0, 1] or are NaN: clamped"),
+        ("color_texture", 1.5, "lie outside [0, 1] or are NaN: clamped"),
+        ("normal_map", -0.5, "lie outside [0, 1] or are NaN: clamped"),
+        ("opacity_texture", -1.0, "lie outside [0, 1] or are NaN: clamped"),
+        ("emission_texture", -1.0, "are negative or NaN: set to 0"),
+        ("emission_texture", f32::NAN, "are negative or NaN: set to 0"),
+        ("bump", f32::NAN, "are NaN or infinite: set to 0"),
+    ] {
+        let said = said(key, odd);
+        assert!(
+            said.len() == 1 && said[0].contains("p.exr: numbers of 1 texels ") && said[0].ends_with(told),
+            "{key}: {said:?}"
+        );
+    }
+    for (key, usual) in [
+        ("color_texture", 1.001),
+        ("color_texture", -0.001),
+        ("emission_texture", 3.0),
+        ("bump", -7.0),
+        ("normal_map", 0.0),
+    ] {
+        assert_eq!(said(key, usual), Vec::<String>::new(), "{key}");
+    }
+}
+
 #[test]
 fn lamps_that_lie_on_others_are_told() {
     let lamp = |name: &str, emission: u32| format!("[[material]]\nname = '{name}'\nemission = {emission}\n");

@@ -56,6 +56,30 @@ impl Kind {
         if self.is_number() { TEXTURE_FLOAT } else { TEXTURE_RGB9E5 }
     }
 
+    /// Whether a picture of floats may have these numbers. What 8 bits would not show is no reason for a warning.
+    fn takes(self, rgb: [f32; 3], alpha: Option<f32>) -> bool {
+        let unit = |v: f32| (-1.0 / 255.0..=1.0 + 1.0 / 255.0).contains(&v);
+        match self {
+            Self::Color | Self::Data => rgb.iter().all(|v| unit(*v)),
+            // What is too bright is told apart.
+            Self::Light => rgb.iter().all(|v| *v >= 0.0),
+            Self::Height => rgb[0].is_finite(),
+            Self::Mask => unit(alpha.unwrap_or(rgb[0])),
+            Self::Alpha => unit(alpha.unwrap_or(1.0)),
+            Self::Red => unit(rgb[0]),
+            Self::Roughness => unit(rgb[1]),
+        }
+    }
+
+    /// What becomes of numbers that it may not have.
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Light => "are negative or NaN: set to 0",
+            Self::Height => "are NaN or infinite: set to 0",
+            _ => "lie outside [0, 1] or are NaN: clamped",
+        }
+    }
+
     /// The texel of a picture of floats.
     fn word(self, [r, g, b]: [f32; 3], alpha: Option<f32>) -> u32 {
         let unit = |v: f32| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) };
@@ -103,6 +127,8 @@ pub struct Decoded {
     pub textures: Vec<Texture>,
     /// Texels of all pictures, in the forms that the records' flags say.
     pub texels: Vec<u32>,
+    /// Of each picture, how many texels have numbers that its kind may not have.
+    odd: Vec<usize>,
 }
 
 impl TextureSet {
@@ -202,7 +228,7 @@ impl TextureSet {
     ///
     /// # Errors
     /// As [`Self::decode`].
-    pub fn decode_after(&self, Decoded { mut pictures, mut texels, .. }: Decoded) -> Result<Decoded> {
+    pub fn decode_after(&self, Decoded { mut pictures, mut texels, mut odd, .. }: Decoded) -> Result<Decoded> {
         let (before, requested) = (texels.len(), &self.pictures[pictures.len()..]);
         let sources: Vec<_> = requested.par_iter().map(|(path, _)| self.source(path)).collect::<Result<_>>()?;
         let mut total = before as u64;
@@ -224,16 +250,21 @@ impl TextureSet {
         memory::need(format!("textures of {total} texels"), 4 * more as u64 + while_decoded(&sources))?;
         memory::reserve("textures", &mut texels, more)?;
         texels.resize(total as usize, 0u32);
-        jobs(sources, &mut texels[before..]).into_par_iter().zip(requested).try_for_each(
-            |((source, space), (path, kind))| {
-                contained(|| source.decode(*kind, space)).map_err(|what| damaged(path, what))
-            },
-        )?;
-        Ok(Decoded { pictures, textures, texels })
+        let decoded = jobs(sources, &mut texels[before..]).into_par_iter().zip(requested);
+        let decoded = decoded.map(|((source, space), (path, kind))| {
+            contained(|| source.decode(*kind, space)).map_err(|what| damaged(path, what))
+        });
+        odd.extend(decoded.collect::<Result<Vec<usize>>>()?);
+        Ok(Decoded { pictures, textures, texels, odd })
     }
 
-    /// A warning for every picture of emission with colours that the form of its texels cannot hold.
+    /// A warning for every picture of floats with numbers that its kind may not have, and for every one of emission with colours that the
+    /// form of its texels cannot hold.
     pub fn clipped(&self, decoded: &Decoded) -> Vec<String> {
+        let odd = self.pictures.iter().zip(&decoded.odd).filter(|(_, odd)| **odd > 0);
+        let odd = odd.map(|((path, kind), odd)| {
+            format!("texture {}: numbers of {odd} texels {}", path.display(), kind.remedy())
+        });
         let lamps = self.pictures.iter().zip(&decoded.pictures);
         let lamps = lamps.filter(|((_, kind), t)| *kind == Kind::Light && t.flags & TEXTURE_RGB9E5 != 0);
         let warning = |((path, _), texture): (&(PathBuf, Kind), &Texture)| {
@@ -247,7 +278,7 @@ impl TextureSet {
                 )
             })
         };
-        lamps.filter_map(warning).collect()
+        odd.chain(lamps.filter_map(warning)).collect()
     }
 
     fn source(&self, path: &Path) -> Result<Source<'_>> {

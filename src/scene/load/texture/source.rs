@@ -57,13 +57,13 @@ impl<'a> Source<'a> {
     ///
     /// # Errors
     /// What is wrong with the picture.
-    pub fn decode(self, kind: Kind, space: &mut [u32]) -> Checked {
+    pub fn decode(self, kind: Kind, space: &mut [u32]) -> Checked<usize> {
         let deep = matches!(self, Self::Deep(..)) && kind.is_number();
         let (bytes, size) = match self {
             Self::Bitmap(bitmap) => {
                 let texels = || bitmap.rgba.iter().copied();
                 fill(space, texels(), kind, kind != Kind::Mask || !texels().all(|rgba| is_idle(rgba, 255)));
-                return Ok(());
+                return Ok(0);
             }
             Self::Floats(bytes, size) => return fill_floats(space, &bytes, size, kind),
             Self::File(bytes, size) | Self::Deep(bytes, size) => (bytes, size),
@@ -79,7 +79,7 @@ impl<'a> Source<'a> {
             DynamicImage::ImageRgba8(rgba) => fill(space, rgba.pixels().map(|p| p.0), kind, has_alpha),
             rare => fill_by_bands(space, rare, kind, has_alpha, deep),
         }
-        Ok(())
+        Ok(0)
     }
 }
 
@@ -112,7 +112,8 @@ fn is_idle<T: PartialEq>([r, g, b, alpha]: [T; 4], full: T) -> bool {
     alpha == full && r == g && g == b
 }
 
-fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> Checked {
+/// Returns how many texels have numbers that the kind may not have.
+fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> Checked<usize> {
     let film = decode(bytes)?;
     if film.size() != size {
         return Err("its header says another size".to_owned());
@@ -123,10 +124,13 @@ fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> C
         let idle = |(i, &[r, g, b]): (usize, &[f32; 3])| is_idle([r, g, b, a.at(i)], 1.0);
         alpha = alpha.filter(|_| !colour.pixels.iter().enumerate().all(idle));
     }
+    let mut odd = 0;
     for (i, (texel, rgb)) in space.iter_mut().zip(colour.pixels).enumerate() {
-        *texel = kind.word(rgb, alpha.map(|alpha| alpha.at(i)));
+        let alpha = alpha.map(|alpha| alpha.at(i));
+        *texel = kind.word(rgb, alpha);
+        odd += usize::from(!kind.takes(rgb, alpha));
     }
-    Ok(())
+    Ok(odd)
 }
 
 fn fill_deep(space: &mut [u32], texels: impl Iterator<Item = [u16; 4]>, kind: Kind, has_alpha: bool) {
