@@ -337,7 +337,12 @@ fn mistakes_are_one_line_with_place_and_remedy() {
         ("[[mesh]]\nshape = \"sphere\"\ntransform = { scale = [1, 1, 1e-38] }", "its transform has no inverse"),
         ("[[mesh]]\nshape = \"cube\"\ntransform = { scale = 1e-30 }", "its transform has no inverse"),
         ("[[mesh]]\nshape = \"cube\"\ntransform = { scale = 1e30 }", "coordinate of 1e30: the limit is 1e12"),
-        ("[[mesh]]\nshape = \"cube\"\ntransform = { translate = [nan, 0, 0] }", "no inverse"),
+        (
+            "[[mesh]]\nshape = \"cube\"\ntransform = { translate = [nan, 0, 0] }",
+            "cube\": its transform has a number that is",
+        ),
+        ("[environment]\nfile = \"\"", "scene.toml, [environment]: its file has an empty name"),
+        ("[[material]]\nname = \"a\"\ncolor = nan", "scene.toml, material \"a\": color is not finite"),
         ("[[mesh]]\nname = \"a\"", "mesh \"a\": needs a file or a shape"),
         ("[[mesh]]\nfile = \"a.obj\"\nshape = \"cube\"", "has more than one of a file, a shape"),
         ("[[mesh]]\nshape = \"cube\"\ngroup = \"x\"", "no group \"x\", since it has none: leave it out"),

@@ -66,6 +66,9 @@ fn image_of(sources: &mut Sources, table: &EnvironmentTable, brightest: f32) -> 
     match (file, &table.picture) {
         _ if table.radiance.is_some() => Err(at("has both radiance and an image: choose one".to_owned())),
         (Some(_), Some(_)) => Err(at("has both file and picture: choose one".to_owned())),
+        _ if table.file.as_ref().is_some_and(|file| file.as_os_str().is_empty()) => {
+            Err(at("its file has an empty name".to_owned()))
+        }
         (Some(path), None) => {
             let picture = load(&path)?;
             from_picture(&path.display().to_string(), &picture, brightest, warnings)

@@ -204,6 +204,9 @@ fn is_stretched(description: &Description, job: &Job) -> bool {
 fn invertible(sources: &Sources, transform: Transform, place: &str) -> Result<DAffine3> {
     match transform.has_inverse() {
         true => Ok(transform.0),
+        false if !transform.0.is_finite() => {
+            Err(sources.at(place, "its transform has a number that is NaN or infinite"))
+        }
         false => Err(sources.at(place, "its transform has no inverse: choose scales other than 0, of 1e-18 or more")),
     }
 }

@@ -276,10 +276,10 @@ pub fn emission(t: &MaterialTable) -> Checked<[f32; 3]> {
 /// A colour that must not exceed 1; larger values are clamped with a warning.
 ///
 /// # Errors
-/// For one that is not finite.
+/// For one that is not finite. The place, up to the key in `what`, is the caller's to add.
 pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Checked<[f32; 3]> {
     if !color.iter().all(|v| v.is_finite()) {
-        return Err(format!("{what} is not finite"));
+        return Err(format!("{} is not finite", what.rsplit(": ").next().unwrap_or(what)));
     }
     let clamped = color.map(|v| v.clamp(0.0, 1.0));
     if clamped != color {
