@@ -124,6 +124,12 @@ fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
         m if m.starts_with("string values must be quoted") => {
             "texts stand in quotes, and the values of a list have commas between them"
         }
+        m if NO_NUMBER.iter().any(|start| m.starts_with(start)) => {
+            "a number begins and ends with a digit, such as 0.5, 2.0 or 1e-3, and has no unit"
+        }
+        m if m.starts_with("unexpected key or value") && text.get(at..).is_some_and(|rest| rest.starts_with(',')) => {
+            "a list stands in brackets, such as [0, 1, 0], and a number has a point, such as 0.5"
+        }
         m if m.starts_with("invalid boolean") => "texts stand in quotes, and true and false are written so",
         m if m.starts_with("wanted exactly 1 element") || m.starts_with("wanted string") => {
             return Some(word(text, at));
@@ -133,6 +139,10 @@ fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
     };
     Some(said.to_owned())
 }
+
+/// What the parser says of .5, 5., 05, 1e and 5deg.
+const NO_NUMBER: [&str; 5] =
+    ["invalid mantissa", "invalid fraction", "invalid exponent", "invalid float", "unexpected leading zero"];
 
 /// Whether nothing stands on the line behind byte `at`.
 fn is_end(text: &str, at: usize) -> bool {
@@ -317,5 +327,11 @@ mod tests {
         says("[[mesh]]\nfile = a.obj", "line 2: texts stand in quotes");
         says("[camera]\nposition = [0 0 3]", "the values of a list have commas between them");
         says("[[mesh]]\nflat = True", "true and false are written so");
+        for number in [".5", "-.5", "+.5", "5.", "1.e5", "1e", "05", "5deg", "0.5f", "1.0.0"] {
+            says(&format!("[camera]\nfov = {number}"), "line 2: a number begins and ends with a digit, such as 0.5");
+            says(&format!("[camera]\nposition = [0, {number}, 1]"), "line 2: a number begins and ends with a digit");
+        }
+        says("[camera]\nfov = 0,5", "line 2: a list stands in brackets, such as [0, 1, 0], and a number has a point");
+        says("[camera]\nposition = 0, 1, 0", "line 2: a list stands in brackets, such as [0, 1, 0]");
     }
 }
