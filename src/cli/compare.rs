@@ -24,6 +24,7 @@ use std::path::{Path, PathBuf};
 /// the sRGB-encoded images cut to [0, 1]. With --statistical, two renders are tested instead for a difference that their noise
 /// does not explain; exit code 0 says that they are the same, 1 that they differ, 7 that they are too noisy to say.
 #[derive(clap::Args)]
+#[command(mut_args(statistical::apart))]
 pub struct Args {
     /// Image to judge (EXR, PNG, JPEG, HDR, TGA or BMP)
     a: PathBuf,

@@ -39,6 +39,35 @@ fn usage_errors_are_one_line_and_exit_2() {
     let limited = run(&["compare", "a.exr", "b.exr", "--statistical", "--max-mse", "1"]);
     complains(&limited, 2, &["'--statistical' cannot be used with '--max-mse <N>'"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--max-mes", "1"]), 2, &["'--max-mes'", "tip:", "'--max-mse'"]);
+    // Beside an option of the metrics, one of the test alone was passed over.
+    for option in [
+        "--map m.png",
+        "--html a.html",
+        "--junit j.xml",
+        "--evidence e",
+        "--errors e.exr",
+        "--resolve 0.1",
+        "--accept 0.1",
+    ] {
+        let words = format!("compare a.exr b.exr --max-mse 1 {option}");
+        complains(&run(&words.split(' ').collect::<Vec<_>>()), 2, &["cannot be used with", "--max-mse"]);
+    }
+    complains(&run(&["filter", "a.exr", "-o", "b.exr", "--no-demodulate", "--eye-rays", "4"]), 2, &["--no-demodulate"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--min-psnr", "nan"]), 2, &["finite"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--diff", "d.exr"]), 2, &["d.exr", ".png"]);
+    complains(&run(&["render", "s.toml", "-o", "a.tif"]), 2, &["a.tif", ".exr", ".png", ".hdr"]);
+    complains(&run(&["render", "s.toml", "--sampler", "x"]), 2, &["sobol"]);
+    complains(&run(&["render", "s.toml", "--width", "wide"]), 2, &["--width", "(see tallow render --help)"]);
+    complains(&run(&["render", "s.toml", "--checkpoint", "0"]), 2, &["--checkpoint", "minutes above 0"]);
+    let negative = run(&["render", "s.toml", "--spp", "-1"]);
+    complains(&negative, 2, &["'-1'", "'--spp <N>'"]);
+    assert!(!String::from_utf8_lossy(&negative.stderr).contains("-- -1"), "a wrong tip");
+}
+
+#[test]
+fn words_of_other_programs_are_answered_by_those_of_this() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |words: &[&str]| tallow(&folder, words);
     // Words of other programs, of which the most alike by their letters were "--sampler" and "--counters".
     std::fs::write(folder.path().join("my s.toml"), "").unwrap();
     for (words, tip) in [
@@ -70,15 +99,6 @@ fn usage_errors_are_one_line_and_exit_2() {
         assert!(output.status.code() == Some(2) && !said.contains("-o ") && !said.contains("to render it"), "{said}");
     }
     complains(&run(&["my s.toml"]), 2, &["tip: to render it, tallow render 'my s.toml' (see tallow --help)"]);
-    complains(&run(&["compare", "a.exr", "b.exr", "--min-psnr", "nan"]), 2, &["finite"]);
-    complains(&run(&["compare", "a.exr", "b.exr", "--diff", "d.exr"]), 2, &["d.exr", ".png"]);
-    complains(&run(&["render", "s.toml", "-o", "a.tif"]), 2, &["a.tif", ".exr", ".png", ".hdr"]);
-    complains(&run(&["render", "s.toml", "--sampler", "x"]), 2, &["sobol"]);
-    complains(&run(&["render", "s.toml", "--width", "wide"]), 2, &["--width", "(see tallow render --help)"]);
-    complains(&run(&["render", "s.toml", "--checkpoint", "0"]), 2, &["--checkpoint", "minutes above 0"]);
-    let negative = run(&["render", "s.toml", "--spp", "-1"]);
-    complains(&negative, 2, &["'-1'", "'--spp <N>'"]);
-    assert!(!String::from_utf8_lossy(&negative.stderr).contains("-- -1"), "a wrong tip");
 }
 
 #[test]

@@ -6,9 +6,21 @@ use crate::cli::{Exit, check_png, complain, print, print_json, readable, within}
 use crate::error::{Error, Result};
 use crate::image::significance::{self, Options, Scale, Verdict};
 use crate::image::{self, output};
+use clap::Arg;
 use serde_json::{Value, json};
 use std::ops::Bound::{Excluded, Included};
 use std::path::{Path, PathBuf};
+
+/// Options of the metrics.
+const OF_METRICS: [&str; 7] = ["layer", "diff", "max_mse", "max_relmse", "max_flip", "min_psnr", "min_ssim"];
+/// Options of the test, which require `--statistical`.
+const OF_TEST: [&str; 9] = ["false_alarms", "resolve", "at", "accept", "errors", "map", "html", "junit", "evidence"];
+
+/// Keeps options of the test from those of the metrics: beside one of these, which `--statistical` cannot be used with, nobody would be
+/// told that it is missing.
+pub fn apart(arg: Arg) -> Arg {
+    if OF_TEST.contains(&arg.get_id().as_str()) { arg.conflicts_with_all(OF_METRICS) } else { arg }
+}
 
 /// Options of the test.
 #[derive(clap::Args)]
@@ -16,7 +28,7 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// Test whether A and B have the same expectation, given the noise that their layers m2, samples or variance tell of:
     /// by pixels, blocks, objects and as a whole
-    #[arg(long, conflicts_with_all = ["layer", "diff", "max_mse", "max_relmse", "max_flip", "min_psnr", "min_ssim"])]
+    #[arg(long, conflicts_with_all = OF_METRICS)]
     pub statistical: bool,
     /// How often images that are the same may be called different
     #[arg(long, value_name = "RATE", default_value_t = Options::default().false_alarms, requires = "statistical",

@@ -21,7 +21,7 @@ pub struct Supersampling {
     #[arg(long, value_name = "FILE", conflicts_with = "no_demodulate")]
     pub scene: Option<PathBuf>,
     /// Eye rays per pixel, 1 to 4096
-    #[arg(long, value_name = "N", requires = "scene", default_value_t = 16,
+    #[arg(long, value_name = "N", requires = "scene", conflicts_with = "no_demodulate", default_value_t = 16,
         value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub eye_rays: u32,
 }
