@@ -21,6 +21,20 @@ pub fn tip(e: &Error, all: &Command, subcommand: Option<&Command>) -> Option<Str
     }
 }
 
+/// Whether the option that clap takes for the most like one that is not known is no typing mistake: of "--verbose" it is "--denoise".
+pub fn misleads(e: &Error) -> bool {
+    let (Some(ContextValue::String(word)), Some(ContextValue::String(near))) =
+        (e.get(ContextKind::InvalidArg), e.get(ContextKind::SuggestedArg))
+    else {
+        return false;
+    };
+    let [word, near] = [word, near].map(|option| option.trim_start_matches('-'));
+    strsim::jaro_winkler(word, near) < LEAST_LIKENESS
+}
+
+/// Options that are less alike, from 0 to 1, are not taken for one another: "verbose" and "denoise" have .71, "max-samples" and "max-spp" .88.
+const LEAST_LIKENESS: f64 = 0.8;
+
 fn of_command(word: &str) -> Option<String> {
     let here = match word {
         "denoise" => "filter",
@@ -59,8 +73,10 @@ fn called(word: &str) -> &'static [&'static str] {
         "--size" | "--resolution" | "--res" | "--dimensions" => &["width", "height"],
         "--gpu" | "--adapter" => &["device"],
         "--threshold" | "--tolerance" | "--max-error" => &["max-mse", "max-relmse", "max-flip", "min-psnr", "min-ssim"],
-        "--time-limit" | "--timeout" | "--budget" => &["time"],
-        "--start" | "--end" | "--start-frame" | "--end-frame" => &["frames"],
+        "--time-limit" | "--timelimit" | "--max-time" | "--timeout" | "--budget" => &["time"],
+        "--out" | "--outfile" | "--output-file" | "--image" => &["output"],
+        "--silent" => &["quiet"],
+        "--start" | "--end" | "--start-frame" | "--end-frame" | "--frame" => &["frames"],
         _ => &[],
     }
 }
@@ -78,7 +94,15 @@ fn of_option(word: &str, command: &Command) -> Option<String> {
     if !word.starts_with('-') && writes(command, word) {
         return Some(format!("what is written is named by -o {}", quoted(word)));
     }
-    let here = called(word);
+    let own = [word.trim_start_matches('-')];
+    let here = match word {
+        "--frames" | "--fps" | "--turntable" => &own,
+        "--list-devices" => return Some("here that is tallow devices".to_owned()),
+        _ => called(word),
+    };
+    if command.get_name() == "render" && ["frames", "fps", "turntable"].iter().any(|name| here == [*name]) {
+        return Some(format!("here that is tallow sequence {}", listed(here)));
+    }
     (!here.is_empty() && here.iter().all(|name| has(command, name))).then(|| format!("here that is {}", listed(here)))
 }
 

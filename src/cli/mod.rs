@@ -156,7 +156,7 @@ fn usage(e: &clap::Error, words: &[OsString]) -> Result<Exit> {
     // Of an option that needs another one only the usage says the name.
     let tells = |p: &String| match e.kind() {
         ErrorKind::MissingRequiredArgument => !p.starts_with("For more"),
-        _ if p.starts_with("tip:") => tip.is_none() && !p.starts_with("tip: to pass"),
+        _ if p.starts_with("tip:") => tip.is_none() && !p.starts_with("tip: to pass") && !elsewhere::misleads(e),
         _ => !["Usage:", "For more"].iter().any(|words| p.starts_with(words)),
     };
     let parts = text.split("\n\n").map(one_line).filter(tells);
