@@ -74,7 +74,7 @@ fn scene_info(path: &Path, [width, height]: [u32; 2], judged: Option<JudgedFrame
 type Found = (Document, Images, Ended);
 
 /// Goes on with an earlier measurement of this key, if there is one, shows a progress bar, and writes what was found. From here on there is
-/// something to save, so a signal only asks it to stop.
+/// something to save, and a folder to take away where nothing is, so a signal only asks it to stop.
 fn measured(
     args: &Args,
     gpu: &Gpu,
@@ -89,13 +89,13 @@ fn measured(
         ("the scene", &args.scene),
     ];
     let inputs: Vec<_> = inputs.iter().filter_map(|(name, path)| Some((*name, path.as_deref()?))).collect();
+    let stop = interrupt::flag();
     let folder = Folder::open(&args.output, &inputs)?;
     if let Some(subject) = args.scene.as_deref().or(args.filter_only.as_deref()) {
         folder.check_subject(&scene_name(subject).to_string_lossy())?;
     }
     let earlier = folder.earlier(key);
     let runs_before = earlier.as_ref().map_or(0, runs);
-    let stop = interrupt::flag();
     let stages = Stages::new(!args.common.talkative());
     let progress = |what: &str, done: u64, total: u64| stages.set(what, done, total);
     let keep = |document: &Document| folder.keep(document);

@@ -147,6 +147,25 @@ fn ctrl_c_is_heard_while_a_filter_runs() {
     complains(&running.end(), 130, &["pipe.exr"]);
 }
 
+/// Its folder was made for what it would have written.
+#[test]
+fn an_interrupted_measurement_without_a_run_leaves_no_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = format!("cost {} --width 64 --height 64 --reference-spp 1000000 --quiet", scene());
+    let mut running = start(&folder, &format!("{words} -o cost"));
+    running.until_there_is("cost");
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["interrupted before a run was complete: nothing was written"]);
+    assert_eq!(names(folder.path()), [""; 0]);
+    // One that was there stays.
+    std::fs::create_dir(folder.path().join("own")).unwrap();
+    let mut running = start(&folder, &format!("{words} -o own"));
+    running.until_it_listens();
+    running.send(&["INT"]);
+    assert_eq!(running.end().status.code(), Some(130));
+    assert_eq!(names(folder.path()), ["own"]);
+}
+
 /// A run that goes on after finished frames has frames to speak of before it has written one itself.
 #[test]
 fn an_interrupted_sequence_says_that_finished_frames_stay() {

@@ -24,6 +24,17 @@ pub struct Folder {
     begun: Vec<(PathBuf, Document)>,
     /// The name of what the one was of that is complete.
     of: Option<String>,
+    /// Whether this run made it.
+    is_new: bool,
+}
+
+/// A run that ends before it has something to write leaves no folder. One that is not empty stays.
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if self.is_new {
+            let _ = std::fs::remove_dir(&self.path);
+        }
+    }
 }
 
 impl Folder {
@@ -35,7 +46,9 @@ impl Folder {
     pub fn open(path: &Path, inputs: &[(&str, &Path)]) -> Result<Self> {
         let places = NAMES.map(|name| path.join(name));
         check_distinct(&places.each_ref().map(|place| ("-o", &**place)), inputs)?;
-        std::fs::create_dir_all(path).map_err(|e| Error::output(path, format!("cannot be made: {e}")))?;
+        let is_new = !path.exists();
+        std::fs::create_dir_all(path)
+            .map_err(|e| Error::output(path, format!("cannot be made: {e}; choose another folder with -o")))?;
         NAMES.iter().try_for_each(|name| output::check(&path.join(name)))?;
         let json = path.join(NAMES[0]);
         let (mut begun, mut of) = (Vec::new(), None);
@@ -47,7 +60,7 @@ impl Folder {
                 false => begun.push((file, document)),
             }
         }
-        Ok(Self { path: path.to_owned(), files: RefCell::default(), begun, of })
+        Ok(Self { path: path.to_owned(), files: RefCell::default(), begun, of, is_new })
     }
 
     /// Checks that a complete measurement there is not of a scene or image of another name: it would be replaced.
