@@ -191,6 +191,7 @@ fn remedy(path: &Path, e: &std::io::Error) -> String {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
             format!("cannot be written: {e}; free some space or choose another folder")
         }
+        ErrorKind::InvalidFilename => format!("cannot be written: {e}; choose a shorter name"),
         ErrorKind::InvalidData => format!("cannot be encoded: {e}"),
         _ if out_of_files() => format!("cannot be written: {e}; close other programs, or raise the limit (ulimit -n)"),
         _ => format!("cannot be written: {e}; choose another folder"),

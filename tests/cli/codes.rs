@@ -410,6 +410,8 @@ fn output_errors_exit_5_and_the_old_file_stays() {
     write(&folder, "a.exr", 64, 0.5);
     complains(&tallow(&folder, &["render", "s.toml", "-o", "missing/a.exr"]), 5, &["missing", "create it"]);
     complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--diff", "missing/d.png"]), 5, &["create it"]);
+    let long = format!("{}.png", "a".repeat(300));
+    complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--diff", &long]), 5, &["choose a shorter name"]);
     #[cfg(target_os = "linux")]
     {
         complains(&tallow(&folder, &["render", "s.toml", "-o", "/proc/a.exr"]), 5, &["/proc takes no new files"]);
