@@ -201,6 +201,21 @@ fn clips_that_move_the_same_are_named() {
     );
 }
 
+/// A pose at one key is that of all times, whenever the key is.
+#[test]
+fn one_key_alone_moves_nothing() {
+    let mut json = triangle();
+    animate(&mut json, 0, "translation", &[0.0, 0.0, 0.0, 4.0, 0.0, 0.0], "VEC3");
+    let moving = load(&json).animation;
+    assert_eq!(moving.moving(), Some(0.0..2.0));
+    assert!(moving.moves_between([1.0, 3.0]) && !moving.moves_between([2.0, 3.0]));
+    let (input, output) = (add(&mut json, &[5.0], "SCALAR"), add(&mut json, &[4.0, 0.0, 0.0], "VEC3"));
+    json["animations"][0]["samplers"][0] = json!({ "input": input, "output": output });
+    let still = load(&json).animation;
+    assert_eq!((still.moving(), still.end()), (None, 5.0));
+    assert!(!still.is_empty() && !still.moves_between([0.0, 9.0]));
+}
+
 #[test]
 fn damaged_animations_are_not_played_and_say_so_in_a_line() {
     let said = |change: &dyn Fn(&mut Value), word: &str| {
