@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Recorder;
 use crate::layout::{FrameConstants, NONE, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
-use crate::render::history::History;
+use crate::render::history::{Handover, History};
 use crate::render::kernels::{Allocation, Kernels};
 use crate::render::pass::sample_list::Bind;
 use crate::render::pass::{accumulate, choose, light_change, path, primary_hit, reproject, sample_list};
@@ -126,7 +126,8 @@ fn begin_anew(rec: &mut Recorder, frame: &Frame) -> Result<()> {
 /// was seen otherwise than from a point.
 fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     let Frame { scene, film, constants, kernels, .. } = frame;
-    let (history, tile) = (frame.history()?, &film.tiles[0]);
+    let handover = handover(frame)?;
+    let (history, tile) = (handover.history, handover.tile);
     if !history.leads_to(&constants.camera) {
         rec.fill(&history.offered, 0)?; // 0 -> offered[P]
         return begin_anew(rec, frame);
@@ -135,14 +136,14 @@ fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     rec.update(&scene.camera, &constants.camera)?; // camera
     rec.fill(&film.broken, 0)?; // 0 -> broken
     match history.probes.as_ref().filter(|_| history.has_changed()) {
-        None => reproject::remember(rec, history, scene, tile, &constants.path)?, // guide[P], stats[P] -> history[P]
+        None => reproject::remember(rec, handover)?, // guide[P], stats[P] -> history[P]
         Some(probes) => {
-            light_change::trace(rec, (history, probes), scene, tile, &constants.path, true)?; // probes[cells], history[P] -> changes[cells]
+            light_change::trace(rec, probes, handover, true)?; // probes[cells], history[P] -> changes[cells]
             light_change::sum(rec, probes)?; // changes[cells] -> changes[cells]
         }
     }
     primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P], points[P]
-    reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
+    reproject::carry(rec, handover)?; // history[P], points[P] -> stats[P], light[P]
     history.settle(Some(constants.camera));
     Ok(())
 }
@@ -158,14 +159,20 @@ fn prepare_policy(rec: &mut Recorder, frame: &Frame) -> Result<()> {
 /// # Errors
 /// As [`record`].
 pub fn record_change(rec: &mut Recorder, frame: &Frame) -> Result<()> {
-    let Frame { scene, film, constants, .. } = frame;
-    let (history, tile) = (frame.history()?, &film.tiles[0]);
+    let handover = handover(frame)?;
+    let history = handover.history;
     let Some(probes) = history.probes.as_ref().filter(|_| history.is_of_points()) else {
         return rec.fill(&history.offered, 0); // 0 -> offered[P]
     };
-    rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
-    reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
-    light_change::trace(rec, (history, probes), scene, tile, &constants.path, false) // points[P] -> probes[cells]
+    rec.copy(&frame.scene.camera, &history.previous)?; // camera -> previous camera
+    reproject::remember(rec, handover)?; // guide[P], stats[P] -> history[P]
+    light_change::trace(rec, probes, handover, false) // points[P] -> probes[cells]
+}
+
+/// Samples are handed over on films of one tile alone.
+fn handover(frame: &Frame) -> Result<Handover<'_>> {
+    let Frame { scene, film, constants, .. } = frame;
+    Ok(Handover { history: frame.history()?, scene, tile: &film.tiles[0], constants: &constants.path })
 }
 
 /// Samples are placed on films of one tile alone.

@@ -24,7 +24,6 @@ impl Renderer {
     /// [`Error::Usage`] for a setting out of range or `indirect_stride`, for a renderer without guides and for a film that is too large;
     /// [`Error::Device`].
     pub fn keep_history(&mut self, settings: Reproject, moves: Moves) -> Result<()> {
-        let (pixels, size) = (self.settings.pixels(), self.settings.size());
         if !self.frame.film.tiles[0].has_guide() {
             let what = "a history needs primary hits: make the renderer with Outputs::guides";
             return Err(Error::Usage(what.into()));
@@ -33,11 +32,11 @@ impl Renderer {
             return Ok(());
         }
         check_stride(&self.settings)?;
-        let history = History::new(&self.gpu, self.effects, self.stack, size, self.settings.spp, (settings, moves))?;
+        let history = History::new(&self.gpu, self.effects, self.stack, &self.settings, settings, moves)?;
         let tile = &mut self.frame.film.tiles[0];
         let none = SurfacePoint { triangle: NONE, instance: NONE, ..SurfacePoint::default() };
-        tile.keep_points(Buffer::from_slice(&self.gpu, "points", &vec![none; pixels])?);
-        tile.stats.write(0, &vec![PixelStats::default(); pixels])?;
+        tile.keep_points(Buffer::from_slice(&self.gpu, "points", &vec![none; self.settings.pixels()])?);
+        tile.stats.write(0, &vec![PixelStats::default(); self.settings.pixels()])?;
         self.frame.kernels.primary_hit = kernels::primary_points(&self.gpu, self.effects, self.stack)?;
         self.frame.history = Some(history);
         Ok(())

@@ -94,7 +94,7 @@ impl Renderer {
         if history.has_changed() {
             return rec.fill(&history.offered, 0); // nothing is handed on
         }
-        history.note(rec, (scene, change), &self.frame.constants.path, self.settings.first_sample)?;
+        history.note(rec, scene, change, &self.frame.constants.path, self.settings.first_sample)?;
         frame::record_change(rec, &self.frame)
     }
 

@@ -1,4 +1,5 @@
 //! What is kept from frame to frame: the samples of each pixel, and the points of the scene that they are of.
+mod handover;
 mod numbers;
 mod probes;
 mod way;
@@ -9,11 +10,13 @@ use crate::layout::{
     Camera, Effects, History as Record, HistoryLight, LightChange, PathConstants, ReprojectPush, SurfacePoint,
 };
 use crate::render::buffers::most_of_one_tile;
+use crate::render::settings::Settings;
 use crate::scene::animation::Animation;
 use crate::scene::{Change, Relit, Scene};
 use crate::settings::{FROM_0, choices, entry, settings};
 use crate::shaders;
 use crate::threads::both;
+pub use handover::Handover;
 use numbers::Numbers;
 pub use probes::Probes;
 use serde::Serialize;
@@ -144,7 +147,7 @@ impl History {
         Ok(())
     }
 
-    /// For a film of `size` pixels, which get `spp` samples a frame. `stack` is [`crate::scene::Scene::stack`].
+    /// For the films of these settings. `stack` is [`crate::scene::Scene::stack`].
     ///
     /// # Errors
     /// [`Error::Usage`] for a setting out of range and for a film that is too large, [`Error::Device`].
@@ -152,18 +155,18 @@ impl History {
         gpu: &Gpu,
         effects: Effects,
         stack: u32,
-        size: [u32; 2],
-        spp: u32,
-        (settings, moves): (Reproject, Moves),
+        of_frame: &Settings,
+        settings: Reproject,
+        moves: Moves,
     ) -> Result<Self> {
         entry::check(&settings.entries())?;
-        let pixels = size[0] * size[1];
+        let pixels = of_frame.pixels() as u32;
         Self::check_room(gpu, pixels)?;
         let thread = gpu.tuning().thread();
         let room = |on: bool| if on { pixels as usize } else { 1 };
         let remember = || Kernel::new(gpu, &shaders::remember::Constants { effects, thread });
         let way = || Way::new(gpu, effects, settings.reproject);
-        let probes = || (moves == Moves::Scene).then(|| Probes::new(gpu, effects, stack, size)).transpose();
+        let probes = || (moves == Moves::Scene).then(|| Probes::new(gpu, effects, stack, of_frame.size())).transpose();
         let (probes, (remember, way)) = both(probes, || both(remember, way))?;
         Ok(Self {
             remember,
@@ -180,7 +183,7 @@ impl History {
             sky: false,
             last: Mutex::new(None),
             settings,
-            spp,
+            spp: of_frame.spp,
         })
     }
 
@@ -188,7 +191,8 @@ impl History {
     pub(super) fn note(
         &mut self,
         rec: &mut Recorder,
-        (scene, change): (&Scene, &Change),
+        scene: &Scene,
+        change: &Change,
         c: &PathConstants,
         first_sample: u32,
     ) -> Result<()> {

@@ -2,43 +2,32 @@
 //! `glsl/reproject/probe.comp`, `glsl/reproject/light_change.comp`. Twins: [`crate::twins::light_change`].
 use crate::error::Result;
 use crate::gpu::{Buffer, Recorder};
-use crate::layout::{LightChange, LightChangePush, PathConstants, ProbePush};
-use crate::render::buffers::{DeviceScene, FilmTile};
-use crate::render::history::{History, Probes};
+use crate::layout::{LightChange, LightChangePush, ProbePush};
+use crate::render::history::{Handover, Probes};
 use crate::shaders::{light_change, probe};
 
 /// Distances between the cells that a level sums: windows of 3x3, 9x9 and 27x27 cells.
 pub const SPACINGS: [u32; 3] = [1, 3, 9];
 
-/// Traces the paths of `h`'s probes `p`. Before the scene changes: points\[P\], offered\[P\] -> probes\[cells\]; `after` it has changed:
+/// Traces the paths of `probes`. Before the scene changes: points\[P\], offered\[P\] -> probes\[cells\]; `after` it has changed:
 /// probes\[cells\], history\[P\] -> changes\[cells\], each cell's own
-pub fn trace(
-    rec: &mut Recorder,
-    (h, p): (&History, &Probes),
-    s: &DeviceScene,
-    t: &FilmTile,
-    constants: &PathConstants,
-    after: bool,
-) -> Result<()> {
+pub fn trace(rec: &mut Recorder, probes: &Probes, handover: Handover, after: bool) -> Result<()> {
+    let Handover { history: h, scene: s, tile: t, constants } = handover;
     let bind = probe::Bind {
         scene: s.bind(),
-        light: p.lights(s, after),
+        light: probes.lights(s, after),
         frame: s.bind_frame(),
         ray_query: s.bind_world(),
         points: &t.points,
         history: &h.records,
         offered: &h.offered,
         previous: &h.previous,
-        probes: &p.probes,
-        changes: &p.changes[0],
+        probes: &probes.probes,
+        changes: &probes.changes[0],
     };
-    let (constants, cells) = (p.constants(constants), p.cells[0] * p.cells[1]);
-    rec.dispatch_threads(
-        &p.trace,
-        bind,
-        &ProbePush { constants, cells, after: after.into(), ..Default::default() },
-        cells,
-    )
+    let (constants, cells) = (probes.constants(constants), probes.cells[0] * probes.cells[1]);
+    let push = ProbePush { constants, cells, after: after.into(), ..Default::default() };
+    rec.dispatch_threads(&probes.trace, bind, &push, cells)
 }
 
 /// changes\[cells\], each cell's own -> changes\[cells\], of windows around them

@@ -2,20 +2,14 @@
 //! [`crate::twins::reproject`].
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
-use crate::layout::{PathConstants, ReprojectPush};
-use crate::render::buffers::{DeviceScene, FilmTile, part_if};
-use crate::render::history::{Forward, History, Way};
+use crate::render::buffers::part_if;
+use crate::render::history::{Forward, Handover, Way};
 use crate::shaders::{carry, edges, gather, project, remember};
-use std::ops::Range;
-
-/// The pixels of each window of a tile, and what kernels are told of them.
-fn windows(h: &History, t: &FilmTile, c: &PathConstants) -> impl Iterator<Item = (Range<usize>, ReprojectPush)> {
-    t.windows().map(|w| (w.start as usize..w.end as usize, h.push(c, w.start, w.end - w.start)))
-}
 
 /// Before the scene changes, and before the new frame's primary hits: guide\[P\], points\[P\], stats\[P\], light\[P\] -> history\[P\]
-pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
-    for (part, push) in windows(h, t, c) {
+pub fn remember(rec: &mut Recorder, handover: Handover) -> Result<()> {
+    let Handover { history: h, scene: s, tile: t, .. } = handover;
+    for (part, push) in handover.windows() {
         let bind = remember::Bind {
             scene: s.bind(),
             frame: s.bind_frame(),
@@ -37,22 +31,16 @@ pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, 
 }
 
 /// After them: history\[P\], guide\[P\], points\[P\], changes\[cells\] -> stats\[P\], light\[P\], carried\[P\]
-pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
-    match &h.way {
-        Way::Forward(way) => forward(rec, way, h, s, t, c),
-        Way::Backward(gather) => backward(rec, gather, h, s, t, c),
+pub fn carry(rec: &mut Recorder, handover: Handover) -> Result<()> {
+    match &handover.history.way {
+        Way::Forward(way) => forward(rec, way, handover),
+        Way::Backward(gather) => backward(rec, gather, handover),
     }
 }
 
-fn forward(
-    rec: &mut Recorder,
-    way: &Forward,
-    h: &History,
-    s: &DeviceScene,
-    t: &FilmTile,
-    c: &PathConstants,
-) -> Result<()> {
-    for (part, push) in windows(h, t, c) {
+fn forward(rec: &mut Recorder, way: &Forward, handover: Handover) -> Result<()> {
+    let Handover { history: h, scene: s, tile: t, constants } = handover;
+    for (part, push) in handover.windows() {
         let winner = &h.carried.part(part)?;
         let bind = edges::Bind { scene: s.bind(), frame: s.bind_frame(), guide: &t.guide, points: &t.points, winner };
         rec.dispatch_threads(&way.edges, bind, &push, push.pixels)?;
@@ -67,8 +55,8 @@ fn forward(
         offered: &h.offered,
         winner: &h.carried,
     };
-    rec.dispatch_threads(&way.project, bind, &h.push(c, 0, t.pixels), t.pixels)?;
-    for (part, push) in windows(h, t, c) {
+    rec.dispatch_threads(&way.project, bind, &h.push(constants, 0, t.pixels), t.pixels)?;
+    for (part, push) in handover.windows() {
         let bind = carry::Bind {
             frame: s.bind_frame(),
             history: &h.records,
@@ -85,15 +73,9 @@ fn forward(
     Ok(())
 }
 
-fn backward(
-    rec: &mut Recorder,
-    gather: &Kernel<gather::Bind<'static>>,
-    h: &History,
-    s: &DeviceScene,
-    t: &FilmTile,
-    c: &PathConstants,
-) -> Result<()> {
-    for (part, push) in windows(h, t, c) {
+fn backward(rec: &mut Recorder, gather: &Kernel<gather::Bind<'static>>, handover: Handover) -> Result<()> {
+    let Handover { history: h, scene: s, tile: t, .. } = handover;
+    for (part, push) in handover.windows() {
         let bind = gather::Bind {
             scene: s.bind(),
             frame: s.bind_frame(),
