@@ -47,13 +47,24 @@ impl Allocate {
         self.policy.placing == Placing::Even
     }
 
+    /// Whether pixels want samples until their errors are below a threshold.
+    pub(crate) fn has_threshold(&self) -> bool {
+        self.noise_threshold > 0.0
+    }
+
+    /// Whether only the device knows how many paths of a list there are to trace: where pixels are chosen, and where a noise
+    /// threshold may ask for less than its round has room for.
+    pub(crate) fn list_may_be_short(&self) -> bool {
+        self.policy.placing == Placing::Chosen || self.has_threshold()
+    }
+
     /// Checks the constraints that involve more than one setting.
     ///
     /// # Errors
     /// [`Error::Usage`] naming the settings that contradict each other.
     pub fn check_together(&self) -> Result<()> {
-        let Self { policy, min_spp, max_spp, noise_threshold, .. } = self;
-        if *noise_threshold > 0.0 && policy.placing != Placing::Learning {
+        let Self { policy, min_spp, max_spp, .. } = self;
+        if self.has_threshold() && policy.placing != Placing::Learning {
             let name = policy.name;
             return Err(Error::Usage(format!(
                 "noise-threshold needs a policy that learns, variance or both: not {name}"

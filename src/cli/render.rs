@@ -257,9 +257,9 @@ pub fn warn_of_unread(args: &Args, settings: &Settings, warnings: &mut Warnings)
 
 /// Tells where other settings leave a policy no samples to place. Where samples are carried from frame to frame they count, too.
 pub fn warn_of_unplaced(settings: &Settings, warnings: &mut Warnings) {
-    let Allocate { policy, min_spp, max_spp, noise_threshold, .. } = settings.allocate.clone();
+    let Allocate { policy, min_spp, max_spp, .. } = settings.allocate;
     let (spp, name) = (settings.spp, policy.name);
-    if noise_threshold > 0.0 || settings.allocate.is_even() {
+    if settings.allocate.has_threshold() || settings.allocate.is_even() {
         return;
     }
     let told = if min_spp >= spp {

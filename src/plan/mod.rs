@@ -163,7 +163,7 @@ fn by_cost(target: Target, mut considered: Vec<Expected>) -> Vec<Expected> {
 
 fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> {
     target.check()?;
-    if settings.allocate.noise_threshold > 0.0 {
+    if settings.allocate.has_threshold() {
         let what = "a noise threshold ends a render by itself: give it, or a time or an error";
         return Err(Error::Usage(what.to_owned()));
     }

@@ -139,7 +139,7 @@ impl<'a> Job<'a> {
             }
         }
         status.stopped = StopReason::Done;
-        if self.has_threshold() {
+        if renderer.settings().allocate.has_threshold() {
             status.stopped = StopReason::Threshold { above: above_threshold(renderer)? };
         }
         self.ended(status)
@@ -261,15 +261,11 @@ impl<'a> Job<'a> {
         Ok(BrokenSamples::join(before, self.renderer.broken_samples()?))
     }
 
-    fn has_threshold(&self) -> bool {
-        self.renderer.settings().allocate.noise_threshold > 0.0
-    }
-
     /// Looks at how the last allocation went. Only a noise threshold makes pixels want nothing.
     fn nobody_wants_more(&self, status: &mut Status) -> Result<bool> {
         let state = self.renderer.apportionment()?;
         status.broken_priorities = status.broken_priorities.max(state.non_finite);
-        Ok(self.has_threshold() && state.wanting == 0)
+        Ok(self.renderer.settings().allocate.has_threshold() && state.wanting == 0)
     }
 }
 

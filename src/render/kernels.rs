@@ -6,7 +6,6 @@ use crate::layout::Effects;
 use crate::render::pass::apportion::Apportion;
 use crate::render::pass::scan::Scan;
 use crate::render::pass::{accumulate, choose, path, primary_hit, sample_list};
-use crate::render::schedule;
 use crate::render::settings::Settings;
 use crate::shaders;
 use crate::threads::both;
@@ -77,7 +76,7 @@ impl Allocation {
             choose: Kernel::new(gpu, &gpu.tuning().thread().into())?,
             scan: Scan::new(gpu, thread_items)?,
             sample_list: PerBlock::new(gpu, thread_items)?,
-            list_may_be_short: schedule::list_may_be_short(settings),
+            list_may_be_short: settings.allocate.list_may_be_short(),
         })
     }
 }

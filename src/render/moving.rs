@@ -138,7 +138,7 @@ fn check_stride(settings: &Settings) -> Result<()> {
 
 fn check_placing(settings: &Settings) -> Result<()> {
     check_stride(settings)?;
-    match schedule::list_may_be_short(settings) || settings.allocate.max_spp > 0 {
+    match settings.allocate.list_may_be_short() || settings.allocate.max_spp > 0 {
         true => Err(Error::Usage(
             "carried samples count where a budget is placed: set neither noise_threshold nor max_spp, and choose one of the policies \
              uniform, geometry, variance and both"

@@ -19,7 +19,7 @@ pub fn priority_push(scene: &Scene, s: &Settings) -> PriorityPush {
         limit: schedule::limit(s),
         threshold: a.noise_threshold,
         // A threshold is of the samples' own error: less what a filter removes, pixels would stop above it.
-        filtered: if a.noise_threshold > 0.0 { 0.0 } else { a.both.filtered },
+        filtered: if a.has_threshold() { 0.0 } else { a.both.filtered },
         round: 0,
         stride: s.indirect_stride,
         ..Default::default()

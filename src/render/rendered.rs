@@ -154,6 +154,6 @@ fn most_of_pixel(settings: &Settings) -> u32 {
 
 /// Samples of all pixels at most: those of a noise threshold are bound by the pixels' limit alone.
 fn budget(settings: &Settings) -> u64 {
-    let per_pixel = if settings.allocate.noise_threshold > 0.0 { most_of_pixel(settings) } else { settings.spp };
+    let per_pixel = if settings.allocate.has_threshold() { most_of_pixel(settings) } else { settings.spp };
     u64::from(per_pixel) * settings.pixels() as u64
 }

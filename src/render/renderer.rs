@@ -231,7 +231,7 @@ impl Renderer {
 
     /// Whether only the device knows how many paths [`Renderer::listed`] are listed.
     pub fn list_may_be_short(&self) -> bool {
-        schedule::list_may_be_short(&self.settings)
+        self.settings.allocate.list_may_be_short()
     }
 
     /// Runs one step on the renderer's own queue and waits.

@@ -7,7 +7,7 @@ mod step;
 
 pub use cut::{Cut, uniform};
 pub use progress::{Progress, pending, rest};
-pub use rounds::{Begun, first_spp, frame, limit, list_may_be_short, steps, steps_of_pixel};
+pub use rounds::{Begun, first_spp, frame, limit, steps, steps_of_pixel};
 pub use step::{Batch, Choice, PathRange, Plan, Share, Step};
 
 /// What the tests of the schedule share.

@@ -20,31 +20,24 @@ pub fn steps_of_pixel(settings: &Settings, cut: &Cut, pixel: u32) -> impl Iterat
 
 /// Samples that every pixel gets before any is placed. With a noise threshold, `max_spp` limits them where it is given, not `spp`.
 pub fn first_spp(settings: &Settings) -> u32 {
-    let most = if settings.allocate.noise_threshold > 0.0 { limit(settings) } else { settings.spp };
+    let most = if settings.allocate.has_threshold() { limit(settings) } else { settings.spp };
     if settings.allocate.is_even() { settings.spp } else { settings.allocate.min_spp.min(most) }
 }
 
 /// Largest number of samples of a pixel; where samples are chosen, of those that a threshold decides.
 pub fn limit(settings: &Settings) -> u32 {
     let chosen = settings.allocate.policy.placing == Placing::Chosen;
-    match (settings.allocate.max_spp, settings.allocate.noise_threshold > 0.0 || chosen) {
+    match (settings.allocate.max_spp, settings.allocate.has_threshold() || chosen) {
         (0, true) => settings.spp,
         (0, false) => Settings::MAX_SPP,
         (max, _) => max,
     }
 }
 
-/// Whether only the device knows how many paths of a list there are to trace: where pixels are chosen, and where a noise
-/// threshold may ask for less than its round has room for.
-pub fn list_may_be_short(settings: &Settings) -> bool {
-    let allocate = &settings.allocate;
-    allocate.policy.placing == Placing::Chosen || allocate.noise_threshold > 0.0
-}
-
 pub(super) fn rounds(settings: &Settings, cut: &Cut, done: u32) -> Box<dyn Iterator<Item = Step>> {
     match settings.allocate.policy.placing {
         Placing::Chosen => Box::new(choices(settings, cut, done)),
-        Placing::Learning if settings.allocate.noise_threshold > 0.0 => Box::new(needed(settings, cut, done)),
+        Placing::Learning if settings.allocate.has_threshold() => Box::new(needed(settings, cut, done)),
         placing => {
             let placed = u64::from(first_spp(settings)) * u64::from(cut.pixels);
             Box::new(allocated(settings, placing == Placing::Learning, cut, done, Begun { placed, carried: 0 }))
