@@ -10,7 +10,7 @@ use super::files::{check_not_of_scene, key, scene_name};
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
 use crate::error::{Error, Result};
-use crate::image::{self, output::is_special};
+use crate::image::{self, Film, output::is_special};
 use crate::render::{Carriage, Reproject, ReprojectOverrides};
 use crate::scene::Scene;
 use crate::scene::description::numbered;
@@ -251,11 +251,12 @@ struct Summary<'a> {
 pub fn run(args: &Args) -> Result<Exit> {
     args.check()?;
     let begun = Instant::now();
-    let mut warnings = args.render.common.warnings();
-    let mut stage = Stage::new(args, &mut warnings)?;
-    let mut preview = args.preview.as_ref().map(|_| Preview::default());
-    let (numbers, mut reports) = (args.numbers(stage.frames())?, Vec::new());
-    let ended = render_frames(args, &mut stage, numbers, preview.as_mut(), &mut reports, &mut warnings);
+    let preview = args.preview.as_ref().map(|_| Preview::default());
+    let mut told = Told { preview, reports: Vec::new(), warnings: args.render.common.warnings() };
+    let mut stage = Stage::new(args, &mut told.warnings)?;
+    let numbers = args.numbers(stage.frames())?;
+    let ended = render_frames(args, &mut stage, numbers, &mut told);
+    let Told { preview, reports, warnings } = told;
     if let Ok(end) = &ended {
         interrupt::leave_at_once(end.line().unwrap_or("interrupted: all frames are finished"));
     }
@@ -282,6 +283,21 @@ pub fn run(args: &Args) -> Result<Exit> {
     })
 }
 
+/// What is told of all frames, beside their own files.
+struct Told {
+    preview: Option<Preview>,
+    reports: Vec<FrameReport>,
+    warnings: Warnings,
+}
+
+impl Told {
+    /// Adds a frame to the preview, if there is one.
+    fn show(&mut self, film: &Film, args: &render::Args) -> Result<()> {
+        let Some(preview) = &mut self.preview else { return Ok(()) };
+        preview.add(film, &args.png.write_options()).map_err(|what| Error::Usage(format!("--preview: {what}")))
+    }
+}
+
 /// Why no more frames are rendered, and what is said of that.
 enum End {
     Finished,
@@ -303,35 +319,28 @@ impl End {
 ///
 /// # Errors
 /// The loss of the device.
-fn render_frames(
-    args: &Args,
-    stage: &mut Stage,
-    numbers: Range<u32>,
-    mut preview: Option<&mut Preview>,
-    reports: &mut Vec<FrameReport>,
-    warnings: &mut Warnings,
-) -> Result<End> {
+fn render_frames(args: &Args, stage: &mut Stage, numbers: Range<u32>, told: &mut Told) -> Result<End> {
     let mut unwritten = false;
     for number in numbers.clone() {
         let line = interruption(args, &format!("in frame {number}"));
-        match reports.is_empty() {
+        match told.reports.is_empty() {
             // Nothing is there to be told yet, and to compile the first frame's kernels may take long.
             true if interrupt::leave_at_once(&line) => interrupt::leave(&line),
             false if interrupt::flag().load(Ordering::SeqCst) => return Ok(End::Interrupted(line)),
             _ => {}
         }
-        let (report, result) = stage.frame(number, preview.as_deref_mut(), warnings);
+        let (report, result) = stage.frame(number, told);
         match result {
             Err(error @ Error::DeviceLost(_)) => {
-                reports.push(report);
+                told.reports.push(report);
                 return Err(error);
             }
             Ok(Exit::Interrupted) => return Ok(End::Interrupted(line)),
             _ => {}
         }
         let left = numbers.end - number - 1;
-        tell(args, &report, left, reports);
-        reports.push(report);
+        tell(args, &report, left, &told.reports);
+        told.reports.push(report);
         let last_unwritten = std::mem::replace(&mut unwritten, matches!(result, Err(Error::Output { .. })));
         if unwritten && last_unwritten && left > 0 {
             let why =

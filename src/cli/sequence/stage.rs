@@ -1,8 +1,7 @@
 //! What a sequence keeps from frame to frame: the scene, its motion, and the renderer.
 use super::chain::Chain;
-use super::preview::Preview;
 use super::survey::Survey;
-use super::{Args, FrameReport, MOST_FRAMES};
+use super::{Args, FrameReport, MOST_FRAMES, Told};
 use crate::cli::Exit;
 use crate::cli::common::Warnings;
 use crate::cli::files::{Files, first_with_layers};
@@ -78,28 +77,26 @@ impl<'a> Stage<'a> {
         let rest = survey.effects(&settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
         let own_seeds = args.seed_per_frame || reproject.is_some() || slides(args, &survey);
-        let moves = Moves::of(&animation);
         render::warn_of_unread(&args.render, &settings, warnings);
         if reproject.is_none() {
             render::warn_of_unplaced(&settings, warnings);
         }
-        let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
         Ok(Self {
             args,
             gpu,
             scene,
+            moves: Moves::of(&animation),
             animation,
             frames,
             settings,
             framed,
             rest,
-            renderer,
-            change,
+            renderer: None,
+            change: Change::default(),
             reproject,
             own_seeds,
-            moves,
-            chain,
-            held,
+            chain: Chain::default(),
+            held: None,
         })
     }
 
@@ -114,16 +111,11 @@ impl<'a> Stage<'a> {
     }
 
     /// Renders a frame, if it is not finished. Nothing that fails here keeps later frames from being rendered.
-    pub fn frame(
-        &mut self,
-        number: u32,
-        preview: Option<&mut Preview>,
-        warnings: &mut Warnings,
-    ) -> (FrameReport, Result<Exit>) {
-        warnings.are_of(format!("frame {number}"));
+    pub fn frame(&mut self, number: u32, told: &mut Told) -> (FrameReport, Result<Exit>) {
+        told.warnings.are_of(format!("frame {number}"));
         let begun = Instant::now();
         let mut report = FrameReport { frame: number, ..Default::default() };
-        let result = self.try_frame(number, preview, &mut report, warnings);
+        let result = self.try_frame(number, &mut report, told);
         if let Err(e) = &result {
             report.error = Some(e.to_string());
             (self.chain, self.held) = (Chain::default(), None);
@@ -136,13 +128,7 @@ impl<'a> Stage<'a> {
         (report, result)
     }
 
-    fn try_frame(
-        &mut self,
-        number: u32,
-        preview: Option<&mut Preview>,
-        report: &mut FrameReport,
-        warnings: &mut Warnings,
-    ) -> Result<Exit> {
+    fn try_frame(&mut self, number: u32, report: &mut FrameReport, told: &mut Told) -> Result<Exit> {
         let (args, settings) = (self.args.of_frame(number)?, self.settings_of(number));
         let begun = Instant::now();
         self.pose(number, report)?;
@@ -153,7 +139,7 @@ impl<'a> Stage<'a> {
             // A run that was not interrupted has compiled in what this frame calls for.
             self.rest = self.rest.or(called_for(&self.scene, &settings, self.wanted()));
             self.chain = self.chain.or_of(&film).with(&self.scene, &settings, self.reproject)?;
-            return show(preview, &film, &args).map(|()| Exit::Done);
+            return told.show(&film, &args).map(|()| Exit::Done);
         }
         outputs::check(&args)?;
         let begun = Instant::now();
@@ -164,7 +150,7 @@ impl<'a> Stage<'a> {
         if !carries {
             self.chain = Chain::default();
         }
-        let mut shot = self.shoot(&args, &settings, carries, warnings)?;
+        let mut shot = self.shoot(&args, &settings, carries, &mut told.warnings)?;
         if let Some(shot) = &mut shot {
             shot.film_mut().metadata.insert(render::FRAME.to_owned(), number.to_string());
         }
@@ -173,8 +159,8 @@ impl<'a> Stage<'a> {
         if carries {
             report.carriage = Some(self.renderer()?.carriage()?);
         }
-        shot.finish(&args, None, false, warnings)?;
-        show(preview, shot.film(), &args)?;
+        shot.finish(&args, None, false, &mut told.warnings)?;
+        told.show(shot.film(), &args)?;
         self.chain = self.chain.with(&self.scene, &settings, self.reproject)?;
         self.held = self.reproject.map(|_| number);
         Ok(Exit::Done)
@@ -309,11 +295,6 @@ fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
         return Err(Error::Usage(format!("{last} frames last to the end of what moves: choose some by --frames")));
     }
     Ok(0..last as u32 + 1)
-}
-
-fn show(preview: Option<&mut Preview>, film: &Film, args: &render::Args) -> Result<()> {
-    let Some(preview) = preview else { return Ok(()) };
-    preview.add(film, &args.png.write_options()).map_err(|what| Error::Usage(format!("--preview: {what}")))
 }
 
 /// Whether noise of one seed would be a pattern on the screen, through which the scene slides, since the camera moves. With
