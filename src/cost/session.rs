@@ -5,7 +5,7 @@ use super::motion::{Motion, Moving};
 use super::rounds::{Measured, Outcome, Runs};
 use crate::denoise::{Noisy, Recipe, Timed, filter, host_bytes, timed};
 use crate::error::{Error, Result};
-use crate::gpu::{FrameResources, Gpu, PassTime, milliseconds};
+use crate::gpu::{FrameResources, Gpu, PassTime, by_pass, milliseconds};
 use crate::image::Picture;
 use crate::machine::wake;
 use crate::memory;
@@ -255,13 +255,10 @@ fn trace(job: &Job, frame: &mut FrameResources, stop: &dyn Fn() -> bool) -> Resu
 
 /// Sums of the times by pass, in the order in which the passes first ran.
 fn passes(times: &[PassTime]) -> Vec<Pass> {
-    let mut passes: Vec<Pass> = Vec::new();
-    for time in times {
-        let ms = time.duration_ms();
-        match passes.iter_mut().find(|pass| pass.pass == time.name) {
-            Some(pass) => (pass.calls, pass.ms) = (pass.calls + 1, pass.ms + ms),
-            None => passes.push(Pass { pass: time.name.to_owned(), calls: 1, ms }),
-        }
-    }
-    passes
+    let sum = |(name, ns): (&str, Vec<u64>)| Pass {
+        pass: name.to_owned(),
+        calls: ns.len(),
+        ms: ns.iter().map(|&ns| ns as f64 * 1e-6).sum(),
+    };
+    by_pass(times).into_iter().map(sum).collect()
 }

@@ -56,8 +56,8 @@ pub use oidn::{OIDN_VARIABLE, Oidn, OidnInput, Texels};
 pub use ray_query::Tracing;
 pub use recorder::Recorder;
 pub use shape::{BoundRange, KernelCode, Pass, PassObserver, PassShape};
-pub(crate) use timing::milliseconds;
 pub use timing::{Calibration, PassTime, host_ns, total_ms};
+pub(crate) use timing::{by_pass, milliseconds};
 pub use tuning::Tuning;
 
 use crate::error::{Error, Result};

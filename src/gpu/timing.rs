@@ -36,6 +36,18 @@ pub fn total_ms<'a>(passes: impl IntoIterator<Item = &'a PassTime>) -> f64 {
     passes.into_iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6
 }
 
+/// Nanoseconds of all calls of each pass, in the order in which the passes first ran.
+pub(crate) fn by_pass(times: &[PassTime]) -> Vec<(&'static str, Vec<u64>)> {
+    let mut passes: Vec<(&'static str, Vec<u64>)> = Vec::new();
+    for time in times {
+        match passes.iter_mut().find(|(name, _)| *name == time.name) {
+            Some((_, durations)) => durations.push(time.duration_ns()),
+            None => passes.push((time.name, vec![time.duration_ns()])),
+        }
+    }
+    passes
+}
+
 /// A duration in milliseconds.
 pub(crate) fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3

@@ -1,5 +1,5 @@
 //! Text tables, and the table of pass times in particular.
-use crate::gpu::PassTime;
+use crate::gpu::{PassTime, by_pass};
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
@@ -20,14 +20,7 @@ pub struct PassRow {
 
 /// Returns one row per pass, in the order in which the passes first ran.
 pub fn summarise(times: &[PassTime]) -> Vec<PassRow> {
-    let mut passes: Vec<(&'static str, Vec<u64>)> = Vec::new();
-    for time in times {
-        let duration = time.duration_ns();
-        match passes.iter_mut().find(|(name, _)| *name == time.name) {
-            Some((_, durations)) => durations.push(duration),
-            None => passes.push((time.name, vec![duration])),
-        }
-    }
+    let passes = by_pass(times);
     let total: u64 = passes.iter().flat_map(|(_, durations)| durations).sum();
     passes.into_iter().map(|(name, durations)| row(name, durations, total)).collect()
 }
