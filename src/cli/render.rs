@@ -18,9 +18,8 @@ use crate::denoise::filter::{self, Method};
 use crate::error::{Checked, Error, Result};
 use crate::gpu::{Gpu, Tracing};
 use crate::image;
-use crate::memory;
 use crate::render::settings::{Allocate, Settings};
-use crate::render::{Checkpoint, Job, Outputs, Renderer, all_effects, film};
+use crate::render::{Checkpoint, Job, Outputs, Renderer, all_effects};
 use crate::scene::{Loaded, Scene, light_and_camera_effects};
 pub use shot::{FRAME, Shot};
 pub use spans::Spans;
@@ -235,11 +234,9 @@ fn renderer(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings) -> Resul
 /// # Errors
 /// [`Error::Memory`], and [`Error::Device`] for what the filter cannot bind.
 pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Result<()> {
-    let (size, unified) = (settings.size(), gpu.info().unified);
-    let while_filtered = denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
-    let bytes = film::host_bytes(settings, unified).max(while_filtered);
-    let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);
-    memory::check_beside_driver(bytes).map_err(|what| Error::Memory(refused(what)))?;
+    let size = settings.size();
+    let refused = |what| Error::Memory(format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]));
+    denoise::check_room(denoise, settings, gpu.info().unified).map_err(refused)?;
     if denoise.is_some() {
         filter::check_size(gpu, size)?;
     }

@@ -3,13 +3,12 @@ use super::document::{Pass, Run, WarmUp};
 use super::grid::{Candidate, Shot};
 use super::motion::{Motion, Moving};
 use super::rounds::{Measured, Outcome, Runs};
-use crate::denoise::{Noisy, Recipe, Timed, filter, host_bytes, timed};
+use crate::denoise::{Noisy, Recipe, Timed, check_room, filter, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime, by_pass, milliseconds};
 use crate::image::Picture;
 use crate::machine::wake;
-use crate::memory;
-use crate::render::{Job, Renderer, Status, called_for, film};
+use crate::render::{Job, Renderer, Status, called_for};
 use crate::scene::{Change, Scene};
 use std::time::{Duration, Instant};
 
@@ -170,11 +169,8 @@ impl<'a> Session<'a> {
 
     fn check_room(&self, shot: usize) -> Result<()> {
         let Shot { settings, points, .. } = &self.shots[shot];
-        let unified = self.gpu.info().unified;
         let filters = points.iter().filter_map(|&point| self.candidates[point].filter);
-        let filtered = filters.map(|filter| host_bytes(filter, settings, unified)).max().unwrap_or(0);
-        let bytes = film::host_bytes(settings, unified).max(filtered);
-        memory::check_beside_driver(bytes)
+        check_room(filters, settings, self.gpu.info().unified)
             .map_err(|what| Error::Memory(format!("rendering {what}: choose a smaller film")))
     }
 

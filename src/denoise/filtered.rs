@@ -7,9 +7,10 @@ use super::filter::oidn;
 use super::filter::{self, FilterSettings, Method, Planes, Scales};
 use super::noisy::{Holds, Noisy};
 use super::windows;
-use crate::error::Result;
+use crate::error::{Checked, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, PassTime, Recorder};
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+use crate::memory;
 use crate::render::film;
 use crate::render::settings::Settings;
 
@@ -181,6 +182,15 @@ pub fn host_bytes(method: Method, settings: &Settings, unified: bool) -> u64 {
     let device = if unified { bytes_per_pixel(method) } else { 0 };
     let colour = size_of::<vec3>() as u64;
     film::host_bytes(settings, false) + settings.pixels() as u64 * (device + colour + method.host_bytes())
+}
+
+/// Checks that the host has room for a render with these settings, and then for each of these filters of its film.
+///
+/// # Errors
+/// What it needs and what there is.
+pub(crate) fn check_room(filters: impl IntoIterator<Item = Method>, settings: &Settings, unified: bool) -> Checked {
+    let filtered = filters.into_iter().map(|method| host_bytes(method, settings, unified)).max().unwrap_or(0);
+    memory::check_beside_driver(film::host_bytes(settings, unified).max(filtered))
 }
 
 /// The filter's own buffers last no longer than this, but for what it expects of its errors. What ran on the host is timed by its

@@ -19,6 +19,7 @@ pub mod twin;
 pub use demodulation::Demodulation;
 pub use denoiser::Denoiser;
 pub use expected::ExpectedError;
+pub(crate) use filtered::check_room;
 pub use filtered::{Clean, Colour, Filtered, Recipe, bytes_per_pixel, host_bytes};
 pub use light_left::note_of_lost_light;
 pub use noisy::{Holds, Noisy};
