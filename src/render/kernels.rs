@@ -27,23 +27,22 @@ impl Kernels {
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses one, or the paths do not fit.
     pub fn new(gpu: &Gpu, effects: Effects, stack: u32, max_depth: u32, paths: u32) -> Result<Self> {
-        let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
+        let thread = gpu.tuning().thread();
         let path = || path::Paths::new(gpu, effects, stack, max_depth, paths);
-        let points = false;
-        let primary_hit = || Kernel::new(gpu, &shaders::primary_hit::Constants { effects, thread, traverse, points });
+        let primary_hit = || primary_hit(gpu, effects, stack, false);
         let accumulate = || Kernel::new(gpu, &shaders::accumulate::Constants { effects, thread });
         let (path, (primary_hit, accumulate)) = both(path, || both(primary_hit, accumulate))?;
         Ok(Self { primary_hit, path, accumulate })
     }
 }
 
-/// The kernel that finds primary hits, for films that keep a history: it writes their points as well.
+/// The kernel that finds primary hits. For films that keep a history it writes their `points` as well.
 ///
 /// # Errors
 /// [`crate::error::Error::Device`] when the driver refuses it.
-pub fn primary_points(gpu: &Gpu, effects: Effects, stack: u32) -> Result<primary_hit::Guides> {
+pub fn primary_hit(gpu: &Gpu, effects: Effects, stack: u32, points: bool) -> Result<primary_hit::Guides> {
     let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
-    Kernel::new(gpu, &shaders::primary_hit::Constants { effects, thread, traverse, points: true })
+    Kernel::new(gpu, &shaders::primary_hit::Constants { effects, thread, traverse, points })
 }
 
 /// The kernels that decide where samples go, for renders that do not spread them evenly.

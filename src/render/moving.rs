@@ -37,7 +37,7 @@ impl Renderer {
         let none = SurfacePoint { triangle: NONE, instance: NONE, ..SurfacePoint::default() };
         tile.keep_points(Buffer::from_slice(&self.gpu, "points", &vec![none; self.settings.pixels()])?);
         tile.stats.write(0, &vec![PixelStats::default(); self.settings.pixels()])?;
-        self.frame.kernels.primary_hit = kernels::primary_points(&self.gpu, self.effects, self.stack)?;
+        self.frame.kernels.primary_hit = kernels::primary_hit(&self.gpu, self.effects, self.stack, true)?;
         self.frame.history = Some(history);
         Ok(())
     }
