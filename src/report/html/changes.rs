@@ -58,7 +58,7 @@ pub fn draw(document: &Document) -> String {
     let line = LinePlot::new().with_data(equal).with_color(chart::FAINT).with_stroke_width(1.0).with_dashed();
     let mut plots = vec![Plot::Line(line.with_legend("same relMSE × time"))];
     plots.extend(scatters(&marks).into_iter().map(Plot::Scatter));
-    let layout = chart::layout(&plots, 1000.0, 520.0).with_log_scale().with_x_axis_min(left).with_x_axis_max(right);
+    let layout = chart::layout(&plots, 520.0).with_log_scale().with_x_axis_min(left).with_x_axis_max(right);
     let layout = layout.with_y_axis_min(bottom).with_y_axis_max(top);
     let layout = chart::plain_ticks(layout).with_x_label("GPU time, of that without the option");
     let layout = layout.with_y_label("relMSE, of that without the option");

@@ -34,8 +34,8 @@ pub const INK: &str = "var(--ink)";
 /// Colour of what is less important.
 pub const FAINT: &str = "var(--faint)";
 
-/// Layout for these plots.
-pub fn layout(plots: &[Plot], width: f64, height: f64) -> Layout {
+/// Layout for these plots, 1000 units wide: the page scales it.
+pub fn layout(plots: &[Plot], height: f64) -> Layout {
     let ink = || INK.to_owned();
     let theme = Theme {
         background: "none".to_owned(),
@@ -47,7 +47,7 @@ pub fn layout(plots: &[Plot], width: f64, height: f64) -> Layout {
         legend_border: "none".to_owned(),
         ..Theme::light()
     };
-    let layout = Layout::auto_from_plots(plots).with_theme(theme).with_width(width).with_height(height);
+    let layout = Layout::auto_from_plots(plots).with_theme(theme).with_width(1000.0).with_height(height);
     layout.with_font_family("system-ui, sans-serif").with_legend_box(false)
 }
 

@@ -65,7 +65,7 @@ fn plot(marks: &[Mark], name: &str) -> String {
     let front = LinePlot::new().with_data(front(marks)).with_step().with_dashed();
     let front = front.with_color(chart::INK).with_stroke_width(1.5).with_legend("Pareto front");
     let plots: Vec<Plot> = lines.into_iter().chain([Plot::Line(front)]).chain(scatters).collect();
-    let layout = chart::layout(&plots, 1000.0, 560.0).with_log_scale();
+    let layout = chart::layout(&plots, 560.0).with_log_scale();
     let layout = limits(layout, marks).with_x_label("GPU time in ms").with_y_label(name);
     chart::svg(
         plots,

@@ -80,7 +80,7 @@ pub fn draw(document: &Document, unit: Unit) -> String {
         Unit::Milliseconds => ("GPU time in ms", TickFormat::Auto),
         Unit::Share => ("share of GPU time in %", TickFormat::Integer),
     };
-    let layout = chart::layout(&plots, 1000.0, 90.0 + 22.0 * points.len() as f64);
+    let layout = chart::layout(&plots, 90.0 + 22.0 * points.len() as f64);
     let layout = layout.with_x_label(label).with_x_tick_format(format);
     let layout = if unit == Unit::Share { layout.with_x_axis_min(0.0).with_x_axis_max(100.0) } else { layout };
     chart::svg(plots, layout, &format!("{label} by pass"))

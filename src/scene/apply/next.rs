@@ -103,7 +103,7 @@ fn each_once(meshes: impl Iterator<Item = usize>) -> Checked {
 /// A mesh is stored twice where only some of its instances show the colours of its vertices.
 fn next_meshes(scene: &Scene, mesh: usize, to: &Vertices) -> Checked<Vec<NextMesh>> {
     let of_mesh = scene.rig.trees.iter().enumerate().filter(|(_, tree)| tree.mesh == Some(mesh));
-    let found = of_mesh.filter_map(|(index, tree)| Some(next_mesh(scene, (index, tree.soft.as_ref()?), (mesh, to))));
+    let found = of_mesh.filter_map(|(index, tree)| Some(next_mesh(scene, index, tree.soft.as_ref()?, mesh, to)));
     let found = found.collect::<Checked<Vec<_>>>()?;
     match found.is_empty() {
         true => Err(format!("mesh {mesh} cannot be deformed: it needs `moving = true`, and triangles")),
@@ -111,7 +111,7 @@ fn next_meshes(scene: &Scene, mesh: usize, to: &Vertices) -> Checked<Vec<NextMes
     }
 }
 
-fn next_mesh(scene: &Scene, (tree, soft): (usize, &Soft), (mesh, to): (usize, &Vertices)) -> Checked<NextMesh> {
+fn next_mesh(scene: &Scene, tree: usize, soft: &Soft, mesh: usize, to: &Vertices) -> Checked<NextMesh> {
     let before = &scene.triangles[scene.rig.trees[tree].range.clone()];
     let placed = soft.place(to, before).map_err(|what| format!("mesh {mesh} {what}"))?;
     let bounds = bvh::bounds(&placed.triangles).unwrap_or_default();

@@ -121,6 +121,7 @@ impl<'a> Placer<'a> {
         let skin = json.skin.map(|skin| self.skin(skin.value())).transpose()?;
         let weights = json.weights.as_ref().or(self.asset.root.meshes[mesh].weights.as_ref());
         let weighted = weights.is_some() || self.moved.weights[node];
+        let weights = weights.cloned().unwrap_or_default();
         let bends = |primitive: &Arc<Primitive>| {
             skin.is_some() && !primitive.joints.is_empty() || weighted && !primitive.targets.is_empty()
         };
@@ -134,7 +135,7 @@ impl<'a> Placer<'a> {
         let name = json.name.as_ref().or(self.asset.root.meshes[mesh].name.as_ref());
         let name = name.map_or_else(|| format!("node {node}"), |name| one_line(name));
         if !flattened.is_empty() {
-            self.add_moving_flattened(&name, self.meshes[&mesh].clone(), (&flattened, weights, skin.is_some()))?;
+            self.add_moving_flattened(&name, self.meshes[&mesh].clone(), &flattened, &weights, skin.is_some())?;
         }
         if !bends {
             self.placed.entry(mesh).or_default().extend(copies);
@@ -142,7 +143,7 @@ impl<'a> Placer<'a> {
         }
         for primitive in self.meshes[&mesh].clone() {
             let skin = skin.clone().filter(|_| !primitive.joints.is_empty());
-            let weights = weights.cloned().unwrap_or_default();
+            let weights = weights.clone();
             self.add_bent(&name, MovedMesh { number: self.tables.len(), node, primitive, skin, weights }, &copies)?;
         }
         Ok(())
@@ -154,13 +155,15 @@ impl<'a> Placer<'a> {
         &mut self,
         name: &str,
         primitives: Vec<Arc<Primitive>>,
-        (copies, weights, is_skinned): (&[Copy], Option<&Vec<f32>>, bool),
+        copies: &[Copy],
+        weights: &[f32],
+        is_skinned: bool,
     ) -> Result<()> {
         for primitive in primitives.iter().filter(|primitive| !is_skinned || primitive.joints.is_empty()) {
             let primitive = Arc::new(primitive.of_one_joint());
             for Copy { node, own } in copies {
                 let skin = Some(Arc::new(Skin::of_node(*node, *own)));
-                let (number, weights) = (self.tables.len(), weights.cloned().unwrap_or_default());
+                let (number, weights) = (self.tables.len(), weights.to_vec());
                 let bent = MovedMesh { number, node: *node, primitive: primitive.clone(), skin, weights };
                 self.add_bent(name, bent, &[])?;
             }
