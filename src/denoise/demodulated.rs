@@ -1,7 +1,7 @@
 //! A noisy image taken apart on the device, to be filtered and put together again. Kernels: those of `glsl/film` whose names
 //! tell of modulation. Twin: [`super::twin`].
-use super::filter::Planes;
 use super::filter::firefly::{Cut, Fireflies, Removed};
+use super::filter::{Filter, Planes};
 use super::sparse::Sparse;
 use super::{Demodulation, ExpectedError, Holds, Noisy};
 use crate::error::Result;
@@ -87,6 +87,25 @@ impl Demodulated {
             picture: plane("picture")?,
             direct: in_paint.then(|| Direct::new(gpu, holds, pixels)).transpose()?,
         })
+    }
+
+    /// All passes in one command buffer: stats\[P\], light\[P\], guide\[P\] -> picture\[P\]. `of_direct` in-paints direct light, where some
+    /// pixels lack it.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        noisy: &Noisy,
+        filter: &dyn Filter,
+        of_direct: Option<&dyn Filter>,
+    ) -> Result<()> {
+        self.record_split(rec, noisy)?;
+        filter.record(rec, &self.planes)?;
+        self.record_fill(rec)?;
+        if let Some((direct, filter)) = self.direct_planes().zip(of_direct) {
+            filter.record(rec, &direct)?;
+            self.record_direct_join(rec)?;
+        }
+        self.record_join(rec)
     }
 
     /// stats\[P\], light\[P\], guide\[P\] -> radiance\[P\], variance\[P\], factor\[P\], picture\[P\], direct\[P\]

@@ -72,14 +72,7 @@ impl Denoiser {
     /// # Errors
     /// [`Error::Device`].
     pub fn record(&self, rec: &mut Recorder) -> Result<()> {
-        self.parts.record_split(rec, &self.noisy)?;
-        self.filter.record(rec, &self.parts.planes)?;
-        self.parts.record_fill(rec)?;
-        if let Some(direct) = self.parts.direct_planes() {
-            self.filter.record(rec, &direct)?;
-            self.parts.record_direct_join(rec)?;
-        }
-        self.parts.record_join(rec)
+        self.parts.record(rec, &self.noisy, &*self.filter, Some(&*self.filter))
     }
 
     /// Filtered linear radiance (Rec. 709), 4 floats a pixel, the last of them 1. It lies in a buffer of the denoiser's own, which

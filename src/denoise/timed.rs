@@ -5,7 +5,7 @@ use super::filter::{Filter, Method, Planes, Row, Scales, oidn};
 use super::filtered::{Colour, Recipe, colour};
 use super::noisy::Noisy;
 use crate::error::Result;
-use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
+use crate::gpu::{FrameResources, Gpu, PassTime};
 use crate::machine::wake;
 use std::time::{Duration, Instant};
 
@@ -31,7 +31,7 @@ pub(crate) struct Chain<'a> {
     parts: Demodulated,
     filter: Box<dyn Filter>,
     /// For direct light that some pixels lack.
-    direct: Option<(Planes, Box<dyn Filter>)>,
+    of_direct: Option<Box<dyn Filter>>,
     gpu: &'a Gpu,
 }
 
@@ -97,12 +97,9 @@ impl<'a> Chain<'a> {
         gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
         let scales = Scales::of_planes(&parts.planes)?;
         let compiled = |scales: &Scales, size| row.compile(gpu, &(recipe.settings)(scales), size);
-        let of_direct = |planes: Planes| {
-            let filter = compiled(&scales.with_light(&planes.radiance)?, planes.size)?;
-            Ok((planes, filter))
-        };
-        let direct = parts.direct_planes().map(of_direct).transpose()?;
-        Ok(Self { filter: compiled(&scales, parts.planes.size)?, direct, parts, noisy, gpu })
+        let of_direct = |planes: Planes| compiled(&scales.with_light(&planes.radiance)?, planes.size);
+        let of_direct = parts.direct_planes().map(of_direct).transpose()?;
+        Ok(Self { filter: compiled(&scales, parts.planes.size)?, of_direct, parts, noisy, gpu })
     }
 
     /// All passes in one command buffer, as an engine would record them.
@@ -112,7 +109,8 @@ impl<'a> Chain<'a> {
     pub(crate) fn run(&self) -> Result<(Vec<PassTime>, Duration)> {
         let mut frame = FrameResources::new(self.gpu)?;
         let begun = Instant::now();
-        let times = self.gpu.run(&mut frame, |rec| self.record(rec))?;
+        let (filter, of_direct) = (&*self.filter, self.of_direct.as_deref());
+        let times = self.gpu.run(&mut frame, |rec| self.parts.record(rec, &self.noisy, filter, of_direct))?;
         Ok((times, begun.elapsed()))
     }
 
@@ -122,16 +120,5 @@ impl<'a> Chain<'a> {
     /// [`crate::error::Error::Device`].
     pub(crate) fn colour(&self) -> Result<Colour> {
         colour(&self.parts.picture)
-    }
-
-    fn record(&self, rec: &mut Recorder) -> Result<()> {
-        self.parts.record_split(rec, &self.noisy)?;
-        self.filter.record(rec, &self.parts.planes)?;
-        self.parts.record_fill(rec)?;
-        if let Some((planes, filter)) = &self.direct {
-            filter.record(rec, planes)?;
-            self.parts.record_direct_join(rec)?;
-        }
-        self.parts.record_join(rec)
     }
 }
