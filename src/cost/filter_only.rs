@@ -117,14 +117,8 @@ pub fn measure_filters(
 }
 
 fn method(candidate: &FilterCandidate) -> Method {
-    Method {
-        allocate: String::new(),
-        filter: candidate.filter.name().to_owned(),
-        rounds: None,
-        reproject: None,
-        options: candidate.options.clone(),
-        spp: 0,
-    }
+    let (filter, options) = (candidate.filter.name().to_owned(), candidate.options.clone());
+    Method { filter, options, ..Method::default() }
 }
 
 impl Runs for Filters<'_> {
@@ -145,16 +139,8 @@ impl Filters<'_> {
         let scaled = |scales: &filter::Scales| settings.scaled_at_defaults(scales);
         let recipe = Recipe { settings: &scaled, ..Recipe::new(*filter) };
         let filtered = timed(self.gpu, self.layers.upload(self.gpu)?, &recipe)?;
-        let mut run = Run {
-            seed,
-            gpu_ms: 0.0,
-            wall_ms: 0.0,
-            passes: Vec::new(),
-            samples: 0,
-            rays: None,
-            errors: Default::default(),
-        };
-        let warm_up = add_filter(&mut run, &WarmUp { compile_ms: 0.0, first_run_ms: 0.0 }, &filtered);
+        let mut run = Run { seed, ..Run::default() };
+        let warm_up = add_filter(&mut run, &WarmUp::default(), &filtered);
         let size = self.plan.film.size();
         let picture = self.plan.film.as_rec709(Picture::of_planes(size, &filtered.colour));
         let picture = picture.finite().map_err(Error::Device)?;

@@ -119,9 +119,8 @@ fn candidate(base: &Settings, policy: &'static Policy, filter: filter::Method, [
         allocate: policy.name.to_owned(),
         filter: filter.name().to_owned(),
         rounds: Some(rounds).filter(|&rounds| learns && rounds > 0),
-        reproject: None,
-        options: Vec::new(),
         spp,
+        ..Method::default()
     };
     let filter = Some(filter).filter(|filter| !filter.is_none());
     Candidate { method, settings, filter, filter_settings: FilterSettings::default(), carries: None }

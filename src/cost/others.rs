@@ -62,7 +62,7 @@ pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
         if POLICIES.iter().any(|policy| policy.name == method) {
             return Err(wrong(format!("{method} is a policy of Tallow's own: give the renderer another name")));
         }
-        let method = Method { allocate: method, filter, rounds: None, reproject: None, options: Vec::new(), spp };
+        let method = Method { allocate: method, filter, spp, ..Method::default() };
         Ok(OtherRun { method, seed, ms, image: path.parent().unwrap_or(Path::new("")).join(image) })
     };
     let runs: Vec<OtherRun> = csv::Reader::from_reader(&text[..]).deserialize().map(run).collect::<Result<_>>()?;
@@ -114,10 +114,9 @@ fn one(run: &OtherRun, reference: &Reference) -> Result<(Run, Picture)> {
         seed: run.seed,
         gpu_ms: run.ms,
         wall_ms: run.ms,
-        passes: Vec::new(),
         samples: picture.pixels.len() as u64 * u64::from(run.method.spp),
-        rays: None,
         errors: judge(&picture, &reference.picture, reference.noise),
+        ..Run::default()
     };
     Ok((judged, picture))
 }

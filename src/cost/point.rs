@@ -47,7 +47,7 @@ impl Point {
 }
 
 /// The settings of a point. Points that differ only in `spp` belong to one method.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Method {
     /// Name of the allocation policy; empty with `--filter-only`.
     pub allocate: String,
@@ -65,7 +65,7 @@ pub struct Method {
 }
 
 /// One timed run of a point.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// Seed of the random sequence.
     pub seed: u32,
@@ -96,7 +96,7 @@ pub struct Pass {
 }
 
 /// Costs of the first use.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WarmUp {
     /// Wall time of uploading the scene and making pipelines, in milliseconds.
     pub compile_ms: f64,

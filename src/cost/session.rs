@@ -185,7 +185,7 @@ impl<'a> Session<'a> {
             passes: rendered.passes.clone(),
             samples: rendered.samples,
             rays: Some(rendered.rays),
-            errors: Default::default(),
+            ..Run::default()
         };
         let candidate = &self.candidates[point];
         let Some(method) = candidate.filter else {

@@ -36,20 +36,13 @@ impl Normal {
     }
 }
 
-fn run(seed: u32, gpu_ms: f64, relmse: f64) -> Run {
-    let errors = Errors { relmse: Some(relmse), ..Errors::from_values([None; 8]) };
-    Run { seed, gpu_ms, wall_ms: gpu_ms, passes: Vec::new(), samples: 1, rays: None, errors }
+pub fn run(seed: u32, gpu_ms: f64, relmse: f64) -> Run {
+    let errors = Errors { relmse: Some(relmse), ..Errors::default() };
+    Run { seed, gpu_ms, wall_ms: gpu_ms, samples: 1, errors, ..Run::default() }
 }
 
-fn point(truth: Truth, spp: u32, runs: Vec<Run>) -> Point {
-    let method = Method {
-        allocate: truth.allocate.into(),
-        filter: "none".into(),
-        rounds: None,
-        reproject: None,
-        options: Vec::new(),
-        spp,
-    };
+pub fn point(allocate: &str, spp: u32, runs: Vec<Run>) -> Point {
+    let method = Method { allocate: allocate.into(), filter: "none".into(), spp, ..Method::default() };
     Point { runs, ..Point::unmeasured(method, String::new()) }
 }
 
@@ -67,7 +60,7 @@ fn points(truths: &[Truth], spread: Spread, same_images: bool, seed: u64) -> Vec
                 run(seed, ms, truth.error / n * errors.factor(spread.error))
             };
             let runs = (0..5).map(one).collect();
-            all.push(point(truth, spp, runs));
+            all.push(point(truth.allocate, spp, runs));
         }
     }
     summarise(&mut all);

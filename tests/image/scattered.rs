@@ -1,23 +1,13 @@
 //! What the page of a cost measurement says of runs that scatter: slow runs, fireflies, and seeds that miss a goal.
-use tallow::cost::document::{Errors, Finding, Method, Point, Run, Verdict};
+use crate::cost;
+use tallow::cost::document::{Finding, Point, Verdict};
 use tallow::cost::findings::findings;
 use tallow::cost::summary::summarise;
 
 /// A point of the method with a run for each time and relMSE.
 fn point(allocate: &str, spp: u32, runs: &[(f64, f64)]) -> Point {
-    let method = Method {
-        allocate: allocate.into(),
-        filter: "none".into(),
-        rounds: None,
-        reproject: None,
-        options: Vec::new(),
-        spp,
-    };
-    let run = |(seed, &(gpu_ms, relmse)): (usize, &(f64, f64))| {
-        let errors = Errors { relmse: Some(relmse), ..Errors::from_values([None; 8]) };
-        Run { seed: seed as u32, gpu_ms, wall_ms: gpu_ms, passes: Vec::new(), samples: 1, rays: None, errors }
-    };
-    Point { runs: runs.iter().enumerate().map(run).collect(), ..Point::unmeasured(method, String::new()) }
+    let run = |(seed, &(gpu_ms, relmse))| cost::run(seed, gpu_ms, relmse);
+    cost::point(allocate, spp, (0..).zip(runs).map(run).collect())
 }
 
 /// Points of 1, 4, 16 ... samples per pixel that take 10 ms each, of a method whose relMSE is this times 1, 1/4, 1/16 ... in five runs that

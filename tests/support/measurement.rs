@@ -19,14 +19,8 @@ const METHODS: [(&str, &str, f64, f64, f64); 7] = [
 pub fn document(name: &str) -> Document {
     let mut points: Vec<Point> = METHODS.iter().flat_map(|method| SPP.map(|spp| measured(*method, spp))).collect();
     points.push(shallow(points[31].clone()));
-    let method = Method {
-        allocate: "both".into(),
-        filter: "svgf".into(),
-        rounds: Some(3),
-        reproject: None,
-        options: Vec::new(),
-        spp: 4,
-    };
+    let method =
+        Method { allocate: "both".into(), filter: "svgf".into(), rounds: Some(3), spp: 4, ..Method::default() };
     points.push(Point { failed: Some("filter svgf: the image has no normals".into()), ..empty(method.clone()) });
     points.push(empty(Method { spp: 16, ..method }));
     let front = vec![0, 30, 31, 32, 33, 34];
@@ -99,14 +93,7 @@ fn estimate(value: f64, spread: f64) -> Estimate {
 }
 
 fn measured((allocate, filter, filter_ms, at_one, stays): (&str, &str, f64, f64, f64), spp: u32) -> Point {
-    let method = Method {
-        allocate: allocate.into(),
-        filter: filter.into(),
-        rounds: None,
-        reproject: None,
-        options: Vec::new(),
-        spp,
-    };
+    let method = Method { allocate: allocate.into(), filter: filter.into(), spp, ..Method::default() };
     let n = f64::from(spp);
     let relmse = at_one / n + stays;
     let overhead = if allocate == "uniform" { 0.0 } else { 1.5 };
