@@ -121,14 +121,14 @@ fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
         message.strip_prefix("missing field ").map(|field| format!("the key {} is missing", field.replace('`', "\"")));
     let said = match message.lines().next()? {
         m if m.starts_with("string values must be quoted") && is_end(text, at) => return Some(no_value(text, at)),
+        m if m.starts_with("string values must be quoted") && has_unit(text, at) => NUMBER,
         m if m.starts_with("string values must be quoted") => {
             "texts stand in quotes, and the values of a list have commas between them"
         }
-        m if NO_NUMBER.iter().any(|start| m.starts_with(start)) => {
-            "a number begins and ends with a digit, such as 0.5, 2.0 or 1e-3, and has no unit"
-        }
+        m if m.starts_with("unexpected leading zero") => "no 0 stands before other digits, as in 5, 10 and 0.5",
+        m if NO_NUMBER.iter().any(|start| m.starts_with(start)) => NUMBER,
         m if m.starts_with("unexpected key or value") && text.get(at..).is_some_and(|rest| rest.starts_with(',')) => {
-            "a list stands in brackets, such as [0, 1, 0], and a number has a point, such as 0.5"
+            comma(text, at)
         }
         m if m.starts_with("invalid boolean") => "texts stand in quotes, and true and false are written so",
         m if m.starts_with("wanted exactly 1 element") || m.starts_with("wanted string") => {
@@ -140,9 +140,29 @@ fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
     Some(said.to_owned())
 }
 
-/// What the parser says of .5, 5., 05, 1e and 5deg.
-const NO_NUMBER: [&str; 5] =
-    ["invalid mantissa", "invalid fraction", "invalid exponent", "invalid float", "unexpected leading zero"];
+/// What the parser says of .5, 5., 1e, 5deg and 1.0.0.
+const NO_NUMBER: [&str; 4] = ["invalid mantissa", "invalid fraction", "invalid exponent", "invalid float"];
+
+/// How numbers are written.
+const NUMBER: &str =
+    "a number begins and ends with a digit, has one point at most and no unit, such as 0.5, 2.0 or 1e-3";
+
+/// Whether a number with a unit stands at byte `at`, as in 35mm. Numbers without commas between them have none.
+fn has_unit(text: &str, at: usize) -> bool {
+    let line = text.get(at..).and_then(|rest| rest.split(['\n', ',', ']', '}']).next()).map_or("", code);
+    let unit = line.trim_start_matches(|c: char| c.is_ascii_digit() || c.is_whitespace() || "+-._".contains(c));
+    line.starts_with(|c: char| c.is_ascii_digit()) && !unit.is_empty()
+}
+
+/// What is wrong with the comma at byte `at`, which stands behind a value.
+fn comma(text: &str, at: usize) -> &'static str {
+    let before = text.get(..at).and_then(|before| before.rsplit(['\n', '=']).next()).unwrap_or_default();
+    match before.trim().parse::<f64>() {
+        _ if is_end(text, at + 1) => "no comma stands at the end of a line here",
+        Ok(_) => "a list stands in brackets, such as [0, 1, 0], and a number has a point, such as 0.5",
+        Err(_) => "a list stands in brackets, and its texts in quotes, such as [\"a\", \"b\"]",
+    }
+}
 
 /// Whether nothing stands on the line behind byte `at`.
 fn is_end(text: &str, at: usize) -> bool {
@@ -215,6 +235,14 @@ mod tests {
         let error = parse(Path::new("s.toml"), text).unwrap_err().to_string();
         assert!(error.contains(expected), "{text}: {error}");
         assert!(!error.contains("f64") && !error.contains("sequence") && !error.contains("struct"), "{text}: {error}");
+    }
+
+    /// As [`says`], of the whole sentence.
+    #[track_caller]
+    fn ends(text: &str, expected: &str) {
+        says(text, expected);
+        let error = parse(Path::new("s.toml"), text).unwrap_err().to_string();
+        assert!(error.ends_with(expected), "{text}: {error}");
     }
 
     #[test]
@@ -325,13 +353,38 @@ mod tests {
     fn words_without_quotes_and_lists_without_commas_are_told() {
         says("[film]\nfilter = tent", "line 2: texts stand in quotes");
         says("[[mesh]]\nfile = a.obj", "line 2: texts stand in quotes");
-        says("[camera]\nposition = [0 0 3]", "the values of a list have commas between them");
         says("[[mesh]]\nflat = True", "true and false are written so");
-        for number in [".5", "-.5", "+.5", "5.", "1.e5", "1e", "05", "5deg", "0.5f", "1.0.0"] {
-            says(&format!("[camera]\nfov = {number}"), "line 2: a number begins and ends with a digit, such as 0.5");
-            says(&format!("[camera]\nposition = [0, {number}, 1]"), "line 2: a number begins and ends with a digit");
+        let list = "[camera]\nposition = [0 0 3]";
+        ends(list, "line 2: texts stand in quotes, and the values of a list have commas between them");
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_told() {
+        let number =
+            "a number begins and ends with a digit, has one point at most and no unit, such as 0.5, 2.0 or 1e-3";
+        let zero = "no 0 stands before other digits, as in 5, 10 and 0.5";
+        let words = [".5", "-.5", "+.5", "5.", "1.e5", "1e", "5deg", "0.5f", "1.0.0", "35mm", "5px", "90°", "5 deg"];
+        for (word, told) in words.map(|word| (word, number)).into_iter().chain([("05", zero), ("-010", zero)]) {
+            ends(&format!("[camera]\nfov = {word}"), &format!("line 2: {told}"));
+            ends(&format!("[camera]\nposition = [0, {word}, 1]"), &format!("line 2: {told}"));
         }
-        says("[camera]\nfov = 0,5", "line 2: a list stands in brackets, such as [0, 1, 0], and a number has a point");
-        says("[camera]\nposition = 0, 1, 0", "line 2: a list stands in brackets, such as [0, 1, 0]");
+    }
+
+    #[test]
+    fn commas_without_brackets_are_told() {
+        let of_numbers = "line 2: a list stands in brackets, such as [0, 1, 0], and a number has a point, such as 0.5";
+        let of_texts = "line 2: a list stands in brackets, and its texts in quotes, such as [\"a\", \"b\"]";
+        let end = "line 2: no comma stands at the end of a line here";
+        for (line, told) in [
+            ("fov = 0,5", of_numbers),
+            ("position = 0, 1, 0", of_numbers),
+            ("file = a.obj, b.obj", of_texts),
+            ("file = 'a.obj', 'b.obj'", of_texts),
+            ("width = 64,", end),
+            ("shape = 'cube', # a cube\nfile = 'a.obj'", end),
+            ("position = [0, 0, 1],\n", end),
+        ] {
+            ends(&format!("[camera]\n{line}"), told);
+        }
     }
 }
