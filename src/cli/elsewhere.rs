@@ -15,13 +15,15 @@ pub fn tip(e: &Error, all: &Command, subcommand: Option<&Command>) -> Option<Str
     };
     match (word(ContextKind::InvalidSubcommand), word(ContextKind::InvalidArg), subcommand) {
         (Some(word), ..) => of_command(word),
+        (_, Some("--list-devices"), _) => Some("here that is tallow devices".to_owned()),
         (_, Some(word), Some(subcommand)) => of_option(word, subcommand),
         (_, Some(word), None) => of_no_command(word, all),
         _ => None,
     }
 }
 
-/// Whether the option that clap takes for the most like one that is not known is no typing mistake: of "--verbose" it is "--denoise".
+/// Whether the option that clap takes for the most like one that is not known is no typing mistake: of "--verbose" it is "--denoise" or
+/// "--version", while nothing here prints more than it does.
 pub fn misleads(e: &Error) -> bool {
     let (Some(ContextValue::String(word)), Some(ContextValue::String(near))) =
         (e.get(ContextKind::InvalidArg), e.get(ContextKind::SuggestedArg))
@@ -29,7 +31,7 @@ pub fn misleads(e: &Error) -> bool {
         return false;
     };
     let [word, near] = [word, near].map(|option| option.trim_start_matches('-'));
-    strsim::jaro_winkler(word, near) < LEAST_LIKENESS
+    word == "verbose" || strsim::jaro_winkler(word, near) < LEAST_LIKENESS
 }
 
 /// Options that are less alike, from 0 to 1, are not taken for one another: "verbose" and "denoise" have .71, "max-samples" and "max-spp" .88.
@@ -97,7 +99,6 @@ fn of_option(word: &str, command: &Command) -> Option<String> {
     let own = [word.trim_start_matches('-')];
     let here = match word {
         "--frames" | "--fps" | "--turntable" => &own,
-        "--list-devices" => return Some("here that is tallow devices".to_owned()),
         _ => called(word),
     };
     if command.get_name() == "render" && ["frames", "fps", "turntable"].iter().any(|name| here == [*name]) {

@@ -88,8 +88,10 @@ fn words_of_other_programs_are_answered_by_those_of_this() {
         ("render s.toml --frames 0..3", "'--frames' found; tip: here that is tallow sequence --frames (see"),
         ("render s.toml --frame 3", "'--frame' found; tip: here that is tallow sequence --frames (see"),
         ("render s.toml --list-devices", "tip: here that is tallow devices (see"),
-        // What clap takes for alike: "--denoise" and "--window".
+        ("--list-devices", "'--list-devices' found; tip: here that is tallow devices (see"),
+        // What clap takes for alike: "--denoise", "--version" and "--window".
         ("render s.toml --verbose", "unexpected argument '--verbose' found (see"),
+        ("--verbose s.toml", "unexpected argument '--verbose' found (see tallow --help)"),
         ("render s.toml --cropwindow", "unexpected argument '--cropwindow' found (see"),
         ("render s.toml --max-samples 9", "tip: a similar argument exists: '--max-spp' (see"),
         ("--samples 3", "'--samples' found; tip: a command comes first: tallow render has --spp (see tallow --help)"),
