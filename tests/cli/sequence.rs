@@ -268,12 +268,12 @@ fn without_frames_all_of_the_animation_is_rendered() {
     let one_key = format!("{still}[[animation]]\ncamera = true\nkeys = [{{ time = 0, position = [0, 0, 9] }}]\n");
     fs::write(folder.path().join("s.toml"), one_key).unwrap();
     refused("what moves has no key after time 0; give --frames 0..1");
-    let output = run(&folder, "-o one.#.png --frames 0..1");
-    let line = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(
-        output.status.success() && line.contains("warning: all frames are alike: what moves has no key after time 0"),
-        "{line}"
-    );
+    for (frames, is_told) in [("0..2", true), ("0..1", false)] {
+        let output = run(&folder, &format!("-o one.#.png --frames {frames}"));
+        let line = String::from_utf8_lossy(&output.stderr).into_owned();
+        let told = line.contains("warning: all frames are alike: what moves has no key after time 0");
+        assert!(output.status.success() && told == is_told, "{frames}: {line}");
+    }
 }
 
 /// A pose at a key is that of all times where there is no other, and keys may lie after all frames, before them, or between two of them.
@@ -303,12 +303,21 @@ fn frames_that_no_key_moves_are_told() {
         before.contains("they are from 1 s to 1.5 s, and keys from 0 s to 1 s (choose others by --frames"),
         "{before}"
     );
+    let light =
+        "[[light]]\ntype = 'point'\nname = 'l'\nintensity = 1\nposition = [0, 3, 0]\n[[animation]]\nlight = 'l'\n";
+    let lit = format!("{light}keys = [{{ time = 9, position = [0, 3, 0] }}, {{ time = 10, position = [0, 4, 0] }}]\n");
+    let gap = told(&[0.0, 1.0], &lit, "--frames 8..13");
+    assert!(
+        gap.contains("they are from 4 s to 6 s, and no key moves anything between them (choose others by"),
+        "{gap}"
+    );
     for (times, more, words) in [
         (&[0.0, 1.0][..], "", "--frames 1..3"),
         (&[0.0, 1.0], "repeat = true\n", "--frames 3..5"),
         (&[0.5, 1.0], "", "--frames 1..3"),
         // A frame alone is what was asked for, and a turntable moves.
         (&[5.0, 6.0], "", "--frames 7"),
+        (&[5.0], "", "--frames 3"),
         (&[5.0], "", "--frames 0..2 --turntable 90"),
     ] {
         let line = told(times, more, words);

@@ -57,12 +57,13 @@ impl Survey<'_> {
         cameras.any(|camera| Some(camera) != first)
     }
 
-    /// Why all frames are alike, where keys show that they are. A frame alone is like no other.
+    /// Why all frames are alike, where keys show that they are. Of a frame alone there is nothing to say: it has no other to differ from.
     pub fn why_still(&self) -> Option<String> {
         let times @ [first, last] = [self.frames.start, self.frames.end - 1].map(|number| self.seconds(number));
         // Milliseconds are enough to find a key by.
         let short = |seconds: f64| (seconds * 1e3).round() / 1e3;
         match self.animation.moving() {
+            _ if self.frames.len() <= 1 => None,
             _ if self.animation.is_empty() => {
                 Some("nothing moves in the scene (add [[animation]] tables, or --turntable)".to_owned())
             }
@@ -73,14 +74,20 @@ impl Survey<'_> {
                 "what moves has no second key to move to, and its last is at {} s (give more keys, another --clip, or --turntable)",
                 short(self.animation.end())
             )),
-            Some(span) if self.frames.len() > 1 && !self.animation.moves_between(times) => Some(format!(
+            Some(_) if self.animation.moves_between(times) => None,
+            // What one mover does ends before them, and what another does begins after them.
+            Some(span) if span.start < last && first < span.end => Some(format!(
+                "they are from {} s to {} s, and no key moves anything between them (choose others by --frames or --fps)",
+                short(first),
+                short(last)
+            )),
+            Some(span) => Some(format!(
                 "they are from {} s to {} s, and keys from {} s to {} s (choose others by --frames or --fps)",
                 short(first),
                 short(last),
                 short(span.start),
                 short(span.end)
             )),
-            Some(_) => None,
         }
     }
 
