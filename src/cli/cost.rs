@@ -73,8 +73,8 @@ fn scene_info(path: &Path, [width, height]: [u32; 2], judged: Option<JudgedFrame
 
 type Found = (Document, Images, Ended);
 
-/// Goes on with an earlier measurement of this key, if there is one, shows a progress bar, and writes what was found. From here on there is
-/// something to save, and a folder to take away where nothing is, so a signal only asks it to stop.
+/// Goes on with an earlier measurement of this key, if there is one, shows a progress bar, and writes what was found. A signal only
+/// asks it to stop: what was measured is written first, and where nothing was, the folder that was made for it is removed.
 fn measured(
     args: &Args,
     gpu: &Gpu,

@@ -147,13 +147,13 @@ fn ctrl_c_is_heard_while_a_filter_runs() {
     complains(&running.end(), 130, &["pipe.exr"]);
 }
 
-/// Its folder was made for what it would have written.
+/// Its folder was made for what it would have written, with those above it.
 #[test]
 fn an_interrupted_measurement_without_a_run_leaves_no_folder() {
     let folder = tempfile::tempdir().unwrap();
     let words = format!("cost {} --width 64 --height 64 --reference-spp 1000000 --quiet", scene());
-    let mut running = start(&folder, &format!("{words} -o cost"));
-    running.until_there_is("cost");
+    let mut running = start(&folder, &format!("{words} -o a/b/cost"));
+    running.until_there_is("a/b/cost");
     running.send(&["INT"]);
     complains(&running.end(), 130, &["interrupted before a run was complete: nothing was written"]);
     assert_eq!(names(folder.path()), [""; 0]);

@@ -11,6 +11,7 @@ use crate::report::{html, table as text_table};
 use serde_json::Value;
 use std::cell::RefCell;
 use std::ffi::OsStr;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Names of the results.
@@ -24,15 +25,15 @@ pub struct Folder {
     begun: Vec<(PathBuf, Document)>,
     /// The name of what the one was of that is complete.
     of: Option<String>,
-    /// Whether this run made it.
-    is_new: bool,
+    /// It and those above it that were missing, itself first.
+    made: Vec<PathBuf>,
 }
 
-/// A run that ends before it has something to write leaves no folder. One that is not empty stays.
+/// A run that ends before it has something to write leaves no folder that it made. One that is not empty stays.
 impl Drop for Folder {
     fn drop(&mut self) {
-        if self.is_new {
-            let _ = std::fs::remove_dir(&self.path);
+        for folder in &self.made {
+            let _ = std::fs::remove_dir(folder);
         }
     }
 }
@@ -46,21 +47,25 @@ impl Folder {
     pub fn open(path: &Path, inputs: &[(&str, &Path)]) -> Result<Self> {
         let places = NAMES.map(|name| path.join(name));
         check_distinct(&places.each_ref().map(|place| ("-o", &**place)), inputs)?;
-        let is_new = !path.exists();
-        std::fs::create_dir_all(path)
-            .map_err(|e| Error::output(path, format!("cannot be made: {e}; choose another folder with -o")))?;
+        let is_missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+        let made = path.ancestors().take_while(is_missing).map(Path::to_owned).collect();
+        // What fails from here on leaves no folder either.
+        let mut folder = Self { path: path.to_owned(), files: RefCell::default(), begun: Vec::new(), of: None, made };
+        std::fs::create_dir_all(path).map_err(|e| {
+            let other = if e.kind() == ErrorKind::InvalidFilename { "a shorter name" } else { "another folder" };
+            Error::output(path, format!("cannot be made: {e}; choose {other} with -o"))
+        })?;
         NAMES.iter().try_for_each(|name| output::check(&path.join(name)))?;
         let json = path.join(NAMES[0]);
-        let (mut begun, mut of) = (Vec::new(), None);
         for file in std::iter::once(json.clone()).chain(partial_files(&json)).filter(|file| file.exists()) {
             let document = read(&file)?;
             match document.complete {
-                true if file == json => of = Some(document.scene.name),
+                true if file == json => folder.of = Some(document.scene.name),
                 true => {}
-                false => begun.push((file, document)),
+                false => folder.begun.push((file, document)),
             }
         }
-        Ok(Self { path: path.to_owned(), files: RefCell::default(), begun, of, is_new })
+        Ok(folder)
     }
 
     /// Checks that a complete measurement there is not of a scene or image of another name: it would be replaced.
@@ -355,6 +360,33 @@ mod tests {
         open.write(&Document { complete: true, ..more }, &pictures, true);
         assert!(!files[2].exists() && files[0].exists() && files[1].exists(), "only its own are removed");
         assert_eq!(of(&inside("cost.json")), "third");
+    }
+
+    /// Names of the results may be too long where that of the folder is not.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_cannot_be_opened_leaves_no_folder() {
+        let root = tempfile::tempdir().unwrap();
+        let left = || std::fs::read_dir(root.path()).unwrap().count();
+        let why = |path: &Path| Folder::open(path, &[]).err().unwrap().to_string();
+        let name = why(&root.path().join("above").join("a".repeat(256)));
+        assert!(name.contains("cannot be made") && name.ends_with("; choose a shorter name with -o"), "{name}");
+        assert_eq!(left(), 0);
+        // Bytes of a path that Linux takes, without its end.
+        let most = 4095;
+        let mut deep = root.path().join("above");
+        while deep.as_os_str().len() < most - 300 {
+            deep.push("a".repeat(200));
+        }
+        deep.push("a".repeat(most - 6 - deep.as_os_str().len()));
+        let place = why(&deep);
+        assert!(place.contains("cost.json: cannot be written") && place.contains("choose a shorter name"), "{place}");
+        assert_eq!(left(), 0);
+        drop(Folder::open(&root.path().join("a/b"), &[]).unwrap());
+        assert_eq!(left(), 0);
+        std::fs::create_dir(root.path().join("a")).unwrap();
+        drop(Folder::open(&root.path().join("a/b/c"), &[]).unwrap());
+        assert_eq!((left(), std::fs::read_dir(root.path().join("a")).unwrap().count()), (1, 0), "what was there stays");
     }
 
     /// Once it is complete; what was begun goes on beside it.
