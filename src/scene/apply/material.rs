@@ -10,7 +10,8 @@ use crate::scene::pose::MaterialChange;
 /// # Errors
 /// A sentence that names the number at fault.
 pub fn changed(m: &Material, to: &MaterialChange) -> Checked<Material> {
-    let tint = |value: [f32; 3], what: &str| reflectance(value, what, &mut Vec::new());
+    // Warnings, which alone need a place, are those of the check before.
+    let tint = |value: [f32; 3], key: &str| reflectance(value, "", key, &mut Vec::new());
     let mut m = *m;
     if let Some(color) = to.color {
         match m.kind {

@@ -243,8 +243,8 @@ pub fn check_numbers(scene: &Scene, pose: &Pose) -> Checked<Vec<String>> {
         // That of metallic materials is a factor, which may be more.
         let specular = to.specular.filter(|_| scene.materials[*index].kind != BSDF_METALLIC);
         for (value, key) in [(to.color, "color"), (specular, "specular"), (to.transmission, "transmission")] {
-            let what = format!("{}: {key}", material_name(scene, *index));
-            value.map(|value| reflectance(value, &what, &mut warnings)).transpose()?;
+            let place = material_name(scene, *index);
+            value.map(|value| reflectance(value, &place, key, &mut warnings)).transpose()?;
         }
     }
     Ok(warnings)

@@ -108,7 +108,7 @@ impl Materials {
         let mut m = Self::plain([if body && t.color_texture.is_none() { 0.5 } else { 1.0 }; 3]);
         let mut tint = |to: &mut [f32; 3], color: Option<Rgb>, key: &str| -> Checked {
             if let Some(color) = color {
-                *to = reflectance(color.0, &format!("material \"{}\": {key}", t.name), warn)?;
+                *to = reflectance(color.0, &format!("material \"{}\"", t.name), key, warn)?;
             }
             Ok(())
         };
@@ -276,14 +276,14 @@ pub fn emission(t: &MaterialTable) -> Checked<[f32; 3]> {
 /// A colour that must not exceed 1; larger values are clamped with a warning.
 ///
 /// # Errors
-/// For one that is not finite. The place, up to the key in `what`, is the caller's to add.
-pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Checked<[f32; 3]> {
+/// For one that is not finite, with its `key`. The caller adds `place` to errors, as to all others, while warnings begin with it here.
+pub fn reflectance(color: [f32; 3], place: &str, key: &str, warn: &mut Vec<String>) -> Checked<[f32; 3]> {
     if !color.iter().all(|v| v.is_finite()) {
-        return Err(format!("{} is not finite", what.rsplit(": ").next().unwrap_or(what)));
+        return Err(format!("{key} is not finite"));
     }
     let clamped = color.map(|v| v.clamp(0.0, 1.0));
     if clamped != color {
-        warn.push(format!("{what} {color:?} lies outside [0, 1]: clamped"));
+        warn.push(format!("{place}: {key} {color:?} lies outside [0, 1]: clamped"));
     }
     Ok(clamped)
 }

@@ -21,8 +21,8 @@ impl Materials {
     /// A sentence that names the key at fault.
     pub fn push_metallic(&mut self, table: &MaterialTable, directory: &Path, warn: &mut Vec<String>) -> Checked<u32> {
         let (mut m, mut s) = (Self::plain([1.0; 3]), Source { table, directory, warn });
-        let what = format!("material \"{}\": color", table.name);
-        m.base_color = reflectance(table.color.map_or([1.0; 3], |v| v.0), &what, s.warn)?;
+        let place = format!("material \"{}\"", table.name);
+        m.base_color = reflectance(table.color.map_or([1.0; 3], |v| v.0), &place, "color", s.warn)?;
         m.emission = emission(table)?;
         m.flags |= MATERIAL_GGX;
         m.base_texture = self.texture(&mut s, &table.color_texture, Kind::Color)?;

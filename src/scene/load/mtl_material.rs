@@ -30,15 +30,15 @@ impl Materials {
     pub fn push_mtl(&mut self, mtl: &Mtl, warn: &mut Vec<String>) -> Checked<u32> {
         let block = &mtl.block;
         let mut m = Self::plain([0.0; 3]);
-        let named = |key: &str| format!("material \"{}\": {key}", mtl.name());
+        let place = format!("material \"{}\"", mtl.name());
         let textured = block.diffuse_texture.is_some();
         let kd = match block.diffuse.unwrap_or([if textured { 1.0 } else { 0.6 }; 3]) {
             [0.0, 0.0, 0.0] if textured => [1.0; 3],
             kd => kd,
         };
-        m.base_color = reflectance(kd, &named("Kd"), warn)?;
+        m.base_color = reflectance(kd, &place, "Kd", warn)?;
         let or_mapped = |color: Option<[f32; 3]>, mapped: bool| color.unwrap_or([f32::from(mapped); 3]);
-        let ks = reflectance(or_mapped(block.specular, block.specular_texture.is_some()), &named("Ks"), warn)?;
+        let ks = reflectance(or_mapped(block.specular, block.specular_texture.is_some()), &place, "Ks", warn)?;
         m.emission = radiance(or_mapped(block.emissive, mtl.map("map_Ke").is_some()), "emission")?;
         m.opacity = block.dissolve.unwrap_or(1.0).clamp(0.0, 1.0);
         let kind = mtl_kind(mtl, m.base_color, ks, m.opacity);
@@ -148,8 +148,8 @@ fn mtl_interface(m: &mut Material, mtl: &Mtl, kind: Type, ks: [f32; 3], warn: &m
             m.kind = BSDF_DIELECTRIC;
             m.eta = [index.unwrap_or(1.5); 3];
             m.opacity = 1.0;
-            let what = format!("material \"{}\": Tf", mtl.name());
-            m.transmission = reflectance(mtl.tf().unwrap_or([1.0; 3]), &what, warn)?;
+            let place = format!("material \"{}\"", mtl.name());
+            m.transmission = reflectance(mtl.tf().unwrap_or([1.0; 3]), &place, "Tf", warn)?;
         }
         Type::Coated => {
             m.kind = BSDF_COATED;
