@@ -414,15 +414,16 @@ fn pictures_of_emission_too_bright_for_their_texels_are_told() {
 #[test]
 fn pictures_of_numbers_that_their_use_has_not_are_told() {
     let folder = tempfile::tempdir().unwrap();
-    let said = |key: &str, odd: f32| {
+    let said_of = |key: &str, pixels: [[f32; 3]; 2]| {
         let mut film = Film::new(2, 1);
-        film.add_vec3("", ["R", "G", "B"], &[[odd, odd, 0.5], [0.5; 3]]);
+        film.add_vec3("", ["R", "G", "B"], &pixels);
         write(&folder.path().join("p.exr"), &film, &WriteOptions::default()).unwrap();
         let text = format!(
             "[environment]\n[[material]]\nname = 'a'\n{key} = 'p.exr'\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'a'\n"
         );
         Scene::parse(&folder.path().join("scene.toml"), &text).unwrap().scene.warnings
     };
+    let said = |key: &str, odd: f32| said_of(key, [[odd, odd, 0.5], [0.5; 3]]);
     for (key, odd, told) in [
         ("color_texture", f32::NAN, "lie outside [0, 1] or are NaN: clamped"),
         ("color_texture", f32::INFINITY, "lie outside [0, 1] or are NaN: clamped"),
@@ -435,10 +436,13 @@ fn pictures_of_numbers_that_their_use_has_not_are_told() {
     ] {
         let said = said(key, odd);
         assert!(
-            said.len() == 1 && said[0].contains("p.exr: numbers of 1 texels ") && said[0].ends_with(told),
+            said.len() == 1 && said[0].contains("p.exr: numbers of 1 texel ") && said[0].ends_with(told),
             "{key}: {said:?}"
         );
     }
+    // As an opacity it has one such texel, as a colour two, and is told once.
+    let two = said_of("opacity_texture = 'p.exr'\ncolor_texture", [[2.0; 3], [0.5, -1.0, 0.5]]);
+    assert!(two.len() == 1 && two[0].contains("numbers of 2 texels lie outside"), "{two:?}");
     for (key, usual) in [
         ("color_texture", 1.001),
         ("color_texture", -0.001),

@@ -261,9 +261,17 @@ impl TextureSet {
     /// A warning for every picture of floats with numbers that its kind may not have, and for every one of emission with colours that the
     /// form of its texels cannot hold.
     pub fn clipped(&self, decoded: &Decoded) -> Vec<String> {
-        let odd = self.pictures.iter().zip(&decoded.odd).filter(|(_, odd)| **odd > 0);
-        let odd = odd.map(|((path, kind), odd)| {
-            format!("texture {}: numbers of {odd} texels {}", path.display(), kind.remedy())
+        let mut odd: Vec<(&Path, &str, usize)> = Vec::new();
+        for ((path, kind), &count) in self.pictures.iter().zip(&decoded.odd).filter(|(_, count)| **count > 0) {
+            // A picture of several kinds is told once for all of which the same becomes.
+            match odd.iter_mut().find(|(other, remedy, _)| other == path && *remedy == kind.remedy()) {
+                Some((.., most)) => *most = count.max(*most),
+                None => odd.push((path, kind.remedy(), count)),
+            }
+        }
+        let odd = odd.into_iter().map(|(path, remedy, count)| {
+            let texels = if count == 1 { "texel" } else { "texels" };
+            format!("texture {}: numbers of {count} {texels} {remedy}", path.display())
         });
         let lamps = self.pictures.iter().zip(&decoded.pictures);
         let lamps = lamps.filter(|((_, kind), t)| *kind == Kind::Light && t.flags & TEXTURE_RGB9E5 != 0);

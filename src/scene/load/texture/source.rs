@@ -53,7 +53,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Fills the texels.
+    /// Fills the texels. Returns how many of them have numbers that the kind may not have: only pictures of floats can.
     ///
     /// # Errors
     /// What is wrong with the picture.
