@@ -64,6 +64,8 @@ type Frame = (DVec3, [DVec3; 3]);
 const LEAST_FOV: f64 = 1e-6;
 /// World units.
 const LEAST_EDGE: f64 = 1e-12;
+/// World units to a target, along the view direction: one that a matrix leaves beside or behind the camera is at none that has a focus.
+const LEAST_FOCUS: f64 = 1e-12;
 
 impl Camera {
     /// The device's camera for a film of (width, height) pixels; without a position it looks at a scene of these bounds.
@@ -83,7 +85,7 @@ impl Camera {
             v if (0.0..=MAX_COORDINATE as f32).contains(&v) => Ok(v),
             v => Err(format!("{name} is {v}: choose 0 or a positive number of at most {:e}", MAX_COORDINATE)),
         };
-        let to_target = self.target.map_or(1.0, |t| (DVec3::from(t) - position).dot(forward).max(LEAST_EDGE));
+        let to_target = self.target.map_or(1.0, |t| (DVec3::from(t) - position).dot(forward).max(LEAST_FOCUS));
         let focus_distance = self.focus_distance.unwrap_or(to_target as f32);
         if !(focus_distance > 0.0 && focus_distance <= MAX_COORDINATE as f32) {
             return Err(format!(
