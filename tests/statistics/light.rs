@@ -326,7 +326,8 @@ fn the_key_light_is_the_one_that_is_chosen_most_often() {
     };
     let sky = "[environment]\nradiance = 0.1\n";
     let alone = Workplace::new().scene(&format!("{sky}{bulb}{}", sun(0.2)));
-    let few = Workplace::new().scene(&format!("{bulb}{}{}", bulb.replace("0.3", "-0.4"), sun(1.0)));
+    // The sun is chosen less often than the bulbs together, and more often than each of them.
+    let few = Workplace::new().scene(&format!("{bulb}{}{}", bulb.replace("0.3", "-0.4"), sun(6.0)));
     let (mut of_kinds, mut without, mut rivalled) = ([0; 8], 0, 0);
     for scene in [
         many_lamps(3),
