@@ -1,5 +1,5 @@
 // What a path leaves behind: one vec4 (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). With
-// FX_SOFT what lamps and sky bring to the first hit goes with indirect light, since it is as noisy. w of the first is the number of
+// FX_SOFT what all but the key light brings to the first hit goes with indirect light, since it is as noisy. w of the first is the number of
 // rays, negated where the sample is wrong: its light was not finite, and it is black, or its path `ended_early`. w of the last holds the
 // bits of sample_marks.glsl.
 #include "shared/sample_marks.glsl"

@@ -164,7 +164,7 @@ effects! {
     light_tree: FX_LIGHT_TREE;
     /// Exact spheres among the triangles.
     spheres: FX_SPHERES;
-    /// What lamps and sky bring to the first hit goes with indirect light.
+    /// What all but the key light brings to the first hit goes with indirect light.
     soft_light: FX_SOFT;
     /// Light that a filter takes is traced for some pixels only.
     sparse_light: FX_SPARSE;

@@ -37,7 +37,7 @@ pub fn light_and_camera_effects(scene: &Scene) -> Effects {
     found.effects
 }
 
-/// Whether what lamps and sky bring to the first hit is kept with indirect light. Shadows of delta lights are sharp and free of
+/// Whether what all but the key light brings to the first hit is kept with indirect light. Shadows of that light are sharp and free of
 /// noise, those of lamps and sky are neither.
 pub fn keeps_soft_light_apart(scene: &Scene, settings: &Settings) -> bool {
     settings.split == Split::Soft && scene.has_soft_lights()

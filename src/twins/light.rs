@@ -15,7 +15,7 @@ use glam::{Mat3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles, Vec4, Vec4Swizzles, vec
 use std::f32::consts::PI;
 
 /// One light, seen from a surface point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct LightSample {
     /// Unit direction from the surface to the light.
     pub direction: Vec3,
@@ -107,7 +107,7 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
         }
     };
     let radiance = if pdf > 0.0 { radiance / pdf } else { Vec3::ZERO };
-    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, sharp: 0.0, chosen: 0, key: NONE, kept: 0.0 }
+    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, ..LightSample::default() }
 }
 
 /// A triangle seen from a point: unit vectors to its corners, and its solid angle in steradians.
@@ -200,10 +200,7 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
         distance,
         radiance: if lit { radiance / pdf } else { Vec3::ZERO },
         pdf,
-        sharp: 0.0,
-        chosen: 0,
-        key: NONE,
-        kept: 0.0,
+        ..LightSample::default()
     }
 }
 
@@ -237,10 +234,7 @@ fn sample_sphere_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightS
         distance,
         radiance: if lit { Vec3::from(light.value) * coat / pdf } else { Vec3::ZERO },
         pdf,
-        sharp: 0.0,
-        chosen: 0,
-        key: NONE,
-        kept: 0.0,
+        ..LightSample::default()
     }
 }
 
@@ -298,7 +292,7 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     if light.kind == LIGHT_SPOT {
         radiance *= spot_share(light, direction);
     }
-    LightSample { direction, distance, radiance, pdf: 0.0, sharp: light.probability, chosen: 0, key: NONE, kept: 0.0 }
+    LightSample { direction, distance, radiance, sharp: light.probability, ..LightSample::default() }
 }
 
 /// Density over area by which MIS takes a lamp to be chosen.
@@ -347,11 +341,8 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
             direction: -Vec3::from(light.b),
             distance: INFINITE_DISTANCE,
             radiance: Vec3::from(light.value) / light.probability,
-            pdf: 0.0,
             sharp: light.probability,
-            chosen: 0,
-            key: NONE,
-            kept: 0.0,
+            ..LightSample::default()
         },
         _ => sample_environment(scene, &light, rest, u),
     };

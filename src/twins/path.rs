@@ -29,7 +29,8 @@ use crate::twins::texture::mask_seed;
 pub struct PathSample {
     /// Light that needs no filter, as [`crate::layout::PixelLight::direct`].
     pub direct: Vec3,
-    /// Radiance that arrived by more than one bounce; with [`Effects::soft_light`] also what lamps and sky bring to the first hit.
+    /// Radiance that arrived by more than one bounce; with [`Effects::soft_light`] also what all but the key light brings to the
+    /// first hit.
     pub indirect: Vec3,
     /// What that radiance has been multiplied by: see [`crate::layout::PixelLight::albedo`].
     pub albedo: Vec3,
