@@ -2,7 +2,7 @@
 use crate::layout::{PixelLight, PixelStats, vec3};
 use crate::math::srgb::luminance;
 use crate::shaders::accumulate::{MIN_ALBEDO, ONE_SURFACE};
-use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER};
+use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, SOME_BARE};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -89,7 +89,7 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
             remainder: [ALL_ASTRAY, ALL_PASSED_OVER]
                 .into_iter()
                 .filter(|mark| is_all(a, *mark) && is_all(b, *mark))
-                .sum(),
+                .fold((a.light.remainder | b.light.remainder) & SOME_BARE, |marks, mark| marks | mark),
             ..Default::default()
         },
     }
@@ -104,7 +104,8 @@ fn is_all(p: &Pixel, mark: u32) -> bool {
 fn with_key_light(part: &Pixel, other: &Pixel) -> Pixel {
     let mut part = *part;
     let largest = |p: &Pixel| p.light.albedo.into_iter().fold(0.0, f32::max);
-    let one_surface = largest(other) > ONE_SURFACE * largest(&part);
+    let whole = other.light.remainder & SOME_BARE == 0;
+    let one_surface = whole && largest(other) > ONE_SURFACE * largest(&part);
     if one_surface && is_all(&part, ALL_PASSED_OVER) && !is_all(other, ALL_PASSED_OVER) {
         let light = &mut part.light;
         light.direct =
@@ -184,6 +185,9 @@ mod tests {
         let light = |a: &Pixel, b: &Pixel| (join(a, b).light.direct, join(a, b).light.remainder);
         assert_eq!([light(&unlit, &usual), light(&usual, &unlit)], [([1.5, 1.5, 0.75], 0); 2], "blue keeps all light");
         assert_eq!(light(&unlit, &unlit), ([0.0; 3], ALL_PASSED_OVER));
+        // Where the other part shows a lamp, too, what it sends is not counted for both.
+        let bare = lit(1.5, SOME_BARE, &[3.0, 5.0]);
+        assert_eq!([light(&unlit, &bare), light(&bare, &usual)], [([0.75; 3], SOME_BARE), ([1.5; 3], SOME_BARE)]);
         let some = of(&[1.0, 2.0]);
         assert_eq!((join(&some, &Pixel::default()), join(&Pixel::default(), &some)), (some, some));
         assert_eq!(join(&Pixel::default(), &Pixel::default()), Pixel::default());

@@ -31,7 +31,7 @@ const float MAX_DEVIATION = 1e17, MAX_M2 = 1e35;
 // rounding takes off is kept (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That code takes long to
 // compile, and exists only in renders of so many samples (FX_MANY_SAMPLES).
 const uint MAX_ROUNDED_SAMPLES = 4096u;
-const int BITS = 10, LIGHT_BITS = 5; // bits of a mean's remainder per channel: of all light, of direct light and of albedo
+const int BITS = 10, DIRECT_BITS = 5, ALBEDO_BITS = 4; // bits of a mean's remainder per channel
 
 // Returns where a pixel's samples lie in the batch: (first, step, number).
 uvec3 samples_of(uint i, uint pixel) {
@@ -75,8 +75,8 @@ void fold_light(inout PixelLight l, vec3 kept, vec3 albedo, float share, uint co
         l.direct += (kept - l.direct) * share;
         l.albedo += (albedo - l.albedo) * share;
     } else {
-        move_mean(l.direct, (kept - l.direct) * share, l.remainder, 0, LIGHT_BITS, count);
-        move_mean(l.albedo, (albedo - l.albedo) * share, l.remainder, 3 * LIGHT_BITS, LIGHT_BITS, count);
+        move_mean(l.direct, (kept - l.direct) * share, l.remainder, 0, DIRECT_BITS, count);
+        move_mean(l.albedo, (albedo - l.albedo) * share, l.remainder, 3 * DIRECT_BITS, ALBEDO_BITS, count);
     }
 }
 
@@ -94,8 +94,8 @@ vec3 albedo_along(inout PixelLight l, vec3 noted, uint marks, uint count) {
     return noted;
 }
 
-// Samples of a pixel show one surface where their albedo is at most so much larger than the mean of those before. A mean with sky or a lamp
-// in it, which have none, says nothing of a surface.
+// Samples of a pixel show one surface where their albedo is at most so much larger than the mean of those before, and none of them showed
+// the sky or a lamp: a mean with their light says nothing of a surface.
 const float ONE_SURFACE = 0.75;
 
 // The direct light of sample number `count`. One that passed over the key light counts as the mean of those before it, so that the mean has
@@ -103,7 +103,9 @@ const float ONE_SURFACE = 0.75;
 vec3 direct_along(inout PixelLight l, vec3 direct, vec3 albedo, bvec3 unreflected, uint marks, uint count) {
     if (!FX_SOFT) return direct;
     bool passed_over = (marks & PASSED_OVER) != 0u, all_before = count == 1u || (l.remainder & ALL_PASSED_OVER) != 0u;
-    bool one_surface = count > 1u && largest_channel(l.albedo) > ONE_SURFACE * largest_channel(albedo) && !all(unreflected);
+    if (all(unreflected)) l.remainder |= SOME_BARE;
+    bool whole = count > 1u && (l.remainder & SOME_BARE) == 0u;
+    bool one_surface = whole && largest_channel(l.albedo) > ONE_SURFACE * largest_channel(albedo);
     l.remainder = (l.remainder & ~ALL_PASSED_OVER) | (passed_over && all_before ? ALL_PASSED_OVER : 0u);
     if (!one_surface || passed_over == all_before) return direct;
     if (passed_over) return mix(l.direct, direct, unreflected);

@@ -38,8 +38,8 @@ const int AROUND = 2; // pixels; the weights have a standard deviation of one
 // Whether pixel `q` tells how the key light shines on the surface that `i` shows.
 bool tells_key_light(int q, int i) {
     vec3 normal = Guide_normal(guide, i), off = Guide_position(guide, q) - Guide_position(guide, i);
-    return sampled(q) && !passed_over(q) && reflects(albedo_at(q)) && dot(normal, Guide_normal(guide, q)) > ONE_SURFACE_COSINE
-        && abs(dot(normal, off)) < ONE_PLANE * Guide_depth(guide, i);
+    bool lit = sampled(q) && !marked(q, ALL_PASSED_OVER | SOME_BARE) && reflects(albedo_at(q));
+    return lit && dot(normal, Guide_normal(guide, q)) > ONE_SURFACE_COSINE && abs(dot(normal, off)) < ONE_PLANE * Guide_depth(guide, i);
 }
 
 // Direct light. Where all samples passed over the key light, the pixels around tell what it brings.

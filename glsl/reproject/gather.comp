@@ -49,11 +49,13 @@ void merge(inout Merged m, uint from, Carried c, float weight) {
     m.stats.m2 += weight * (count - 1.0) * h.variance + off * (off * (m.samples * part));
     if (FX_SPLIT) {
         HistoryLight l = HistoryLight_load(history_light, from);
-        bool passed_over = (l.remainder & ALL_PASSED_OVER) != 0u, all_before = m.samples == 0.0 || m.light.remainder != 0u;
+        bool passed_over = (l.remainder & ALL_PASSED_OVER) != 0u;
+        bool all_before = m.samples == 0.0 || (m.light.remainder & ALL_PASSED_OVER) != 0u;
+        uint bare = (m.light.remainder | l.remainder) & SOME_BARE;
         // What knows nothing of the key light counts as what does.
-        if (passed_over && !all_before) l.direct = m.light.direct;
-        if (!passed_over && all_before) m.light.direct = l.direct;
-        m.light.remainder = passed_over && all_before ? ALL_PASSED_OVER : 0u;
+        if (bare == 0u && passed_over && !all_before) l.direct = m.light.direct;
+        if (bare == 0u && !passed_over && all_before) m.light.direct = l.direct;
+        m.light.remainder = bare | (passed_over && all_before ? ALL_PASSED_OVER : 0u);
         float other = luminance(h.mean - l.direct) - luminance(m.stats.mean - m.light.direct);
         m.light.indirect_m2 += weight * (count - 1.0) * l.indirect_variance + other * (other * (m.samples * part));
         m.light.direct += (l.direct - m.light.direct) * part;

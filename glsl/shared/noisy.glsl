@@ -21,5 +21,8 @@ vec3 albedo_at(int i) {
     return HAS_LIGHT && count_at(i) > 0.0 ? PixelLight_albedo(light, i) : Guide_albedo(guide, i);
 }
 
+// Whether a pixel has any of these marks.
+bool marked(int i, uint marks) { return HAS_LIGHT && (PixelLight_remainder(light, i) & marks) != 0u; }
+
 // Whether all samples of a pixel passed over the key light, of which they tell nothing.
-bool passed_over(int i) { return HAS_LIGHT && (PixelLight_remainder(light, i) & ALL_PASSED_OVER) != 0u; }
+bool passed_over(int i) { return marked(i, ALL_PASSED_OVER); }

@@ -6,3 +6,5 @@ const uint PASSED_OVER = 2u;
 
 // Bits of PixelLight.remainder: all samples of a pixel have that mark.
 const uint ALL_ASTRAY = 0x80000000u, ALL_PASSED_OVER = 0x40000000u;
+// A sample of it showed nothing that reflects, as the sky or a lamp.
+const uint SOME_BARE = 0x20000000u;

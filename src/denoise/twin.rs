@@ -8,7 +8,7 @@ use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use crate::math::srgb::luminance;
 use crate::shaders::demodulate::{AROUND, MIRRORED, ONE_PLANE, ONE_SURFACE_COSINE, OUTLIER};
 use crate::shaders::shared::albedo::{SMALLEST_ALBEDO, WHOLE};
-use crate::shaders::shared::sample_marks::ALL_PASSED_OVER;
+use crate::shaders::shared::sample_marks::{ALL_PASSED_OVER, SOME_BARE};
 use glam::Vec3;
 
 /// A noisy image on the host: see [`super::Noisy`].
@@ -78,9 +78,14 @@ impl Pixels {
         self.count(i) > 0.0 && self.stats[i].mean.iter().all(|v| v.is_finite())
     }
 
+    /// Whether a pixel has any of these marks.
+    fn marked(&self, i: usize, marks: u32) -> bool {
+        self.light[i].remainder & marks != 0
+    }
+
     /// Whether no sample tells of the key light.
     fn passed_over(&self, i: usize) -> bool {
-        self.light[i].remainder & ALL_PASSED_OVER != 0
+        self.marked(i, ALL_PASSED_OVER)
     }
 
     fn count(&self, i: usize) -> f32 {
@@ -212,7 +217,8 @@ fn tells_key_light(pixels: &Pixels, q: usize, i: usize) -> bool {
     let (own, theirs) = (&pixels.guide[i], &pixels.guide[q]);
     let normal = Vec3::from(own.normal);
     let off = normal.dot(Vec3::from(theirs.position) - Vec3::from(own.position));
-    let known = pixels.sampled(q) && !pixels.passed_over(q) && reflects(pixels.albedo(q));
+    let lit = !pixels.marked(q, ALL_PASSED_OVER | SOME_BARE);
+    let known = pixels.sampled(q) && lit && reflects(pixels.albedo(q));
     known && normal.dot(theirs.normal.into()) > ONE_SURFACE_COSINE && off.abs() < ONE_PLANE * own.depth
 }
 

@@ -45,8 +45,8 @@ gpu_structs! {
         /// none, times theirs; samples that show emission alone count as 0. Of what clear glass shows, that by the way that most samples
         /// take, mixed with white by the share of the others.
         albedo: vec3,
-        /// As [`PixelStats::remainder`]: six numbers of 5 bits, in units of 2^-5; those of `direct` are the lowest. The two
-        /// highest bits are those of `glsl/shared/sample_marks.glsl` that tell what no sample has seen.
+        /// As [`PixelStats::remainder`]: three numbers of 5 bits for `direct`, in units of 2^-5, and above them three of 4 bits
+        /// for `albedo`, in units of 2^-4. The three highest bits are the marks of `glsl/shared/sample_marks.glsl`.
         remainder: uint,
     }
 

@@ -4,13 +4,14 @@ use crate::math::hash::{pcg, unit_interval};
 use crate::math::srgb::luminance;
 use crate::shaders;
 use crate::shaders::accumulate::{MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO, ONE_SURFACE};
-use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, ASTRAY, PASSED_OVER};
+use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, ASTRAY, PASSED_OVER, SOME_BARE};
 use crate::statistics::next_sample;
 use glam::{Vec3, Vec4};
 
 /// Bits of a mean's remainder, for each channel.
 const BITS: u32 = shaders::accumulate::BITS as u32;
-const LIGHT_BITS: u32 = shaders::accumulate::LIGHT_BITS as u32;
+const DIRECT_BITS: u32 = shaders::accumulate::DIRECT_BITS as u32;
+const ALBEDO_BITS: u32 = shaders::accumulate::ALBEDO_BITS as u32;
 
 /// What a sample brings besides its radiance.
 struct Split {
@@ -27,8 +28,9 @@ fn split(l: &mut PixelLight, direct: Vec3, radiance: Vec3, noted: Vec4, count: u
     let (direct, before) = (Vec3::select(unreflected, radiance, direct), Vec3::from(l.direct));
     let passed_over = marks & PASSED_OVER != 0;
     let all_before = count == 1 || l.remainder & ALL_PASSED_OVER != 0;
+    l.remainder |= if unreflected.all() { SOME_BARE } else { 0 };
     let alike = Vec3::from(l.albedo).max_element() > ONE_SURFACE * albedo.max_element();
-    let one_surface = count > 1 && alike && !unreflected.all();
+    let one_surface = count > 1 && alike && l.remainder & SOME_BARE == 0;
     l.remainder = (l.remainder & !ALL_PASSED_OVER) | if passed_over && all_before { ALL_PASSED_OVER } else { 0 };
     match one_surface && passed_over != all_before {
         true if passed_over => return Split { direct: Vec3::select(unreflected, direct, before), albedo },
@@ -163,8 +165,8 @@ fn fold_light(l: &mut PixelLight, s: &Split, count: u32) {
         true => [direct + by, albedo + albedo_by],
         false => {
             let word = &mut l.remainder;
-            let direct = move_mean(l.direct, by, Kept { word, count }, 0, LIGHT_BITS);
-            [direct, move_mean(l.albedo, albedo_by, Kept { word, count }, 3 * LIGHT_BITS, LIGHT_BITS)]
+            let direct = move_mean(l.direct, by, Kept { word, count }, 0, DIRECT_BITS);
+            [direct, move_mean(l.albedo, albedo_by, Kept { word, count }, 3 * DIRECT_BITS, ALBEDO_BITS)]
         }
     };
     (l.direct, l.albedo) = (direct.into(), albedo.into());
@@ -238,10 +240,12 @@ mod tests {
         assert!(m2.abs() < 1e-6, "{m2}");
         // Of a pixel that shows the sky beside the surface, samples bring what they bring: the sky is not counted for others.
         let sky = [[8.0; 4], [0.0; 4], [0.0; 4]];
-        for order in [[sky, other, other, other], [other, sky, other, other], [other, sky, key, other]] {
-            let kept = order.iter().map(|sample| sample[0][0]).sum::<f32>() / 4.0;
-            let (_, direct, ..) = folded(&order);
+        let (early, late) = ([sky, other, other, other], [key, key, key, key, key, sky, other, other]);
+        for order in [&early[..], &[other, sky, other, other], &[other, sky, key, other], &late] {
+            let kept = order.iter().map(|sample| sample[0][0]).sum::<f32>() / order.len() as f32;
+            let (_, direct, _, remainder) = folded(order);
             assert!((direct - kept).abs() < 1e-6, "{direct}, expected {kept}: {order:?}");
+            assert_eq!(remainder, SOME_BARE, "{order:?}");
         }
         // A channel without albedo keeps all light there is.
         let dark = |mut sample: [vec4; 3]| {

@@ -5,7 +5,7 @@ use crate::math::srgb::luminance;
 use crate::render::Carried;
 use crate::shaders::gather::{MOST_M2, STEPS};
 use crate::shaders::shared::history::*;
-use crate::shaders::shared::sample_marks::ALL_PASSED_OVER;
+use crate::shaders::shared::sample_marks::{ALL_PASSED_OVER, SOME_BARE};
 use crate::twins::camera::{film_from_point, pixel_width};
 use crate::twins::surface::Surface;
 use glam::{IVec2, Vec2, Vec3, ivec2, vec2};
@@ -40,12 +40,13 @@ impl Merged {
             *m2 += weight * (count - 1.0) * h.variance[k] + off * (off * between);
         }
         let passed_over = l.remainder & ALL_PASSED_OVER != 0;
-        let all_before = self.samples == 0.0 || light.remainder != 0;
-        let direct = if passed_over && !all_before { light.direct } else { l.direct };
-        if !passed_over && all_before {
+        let all_before = self.samples == 0.0 || light.remainder & ALL_PASSED_OVER != 0;
+        let bare = (light.remainder | l.remainder) & SOME_BARE;
+        let direct = if bare == 0 && passed_over && !all_before { light.direct } else { l.direct };
+        if bare == 0 && !passed_over && all_before {
             light.direct = direct;
         }
-        light.remainder = if passed_over && all_before { ALL_PASSED_OVER } else { 0 };
+        light.remainder = bare | if passed_over && all_before { ALL_PASSED_OVER } else { 0 };
         let other = |mean: [f32; 3], direct: [f32; 3]| luminance(Vec3::from(mean) - Vec3::from(direct));
         let off = other(h.mean, direct) - other(stats.mean, light.direct);
         light.indirect_m2 += weight * (count - 1.0) * l.indirect_variance + off * (off * between);

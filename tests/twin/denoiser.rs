@@ -16,7 +16,7 @@ use tallow::layout::{Guide, NONE, PixelLight, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::Scene;
-use tallow::shaders::shared::sample_marks::ALL_PASSED_OVER;
+use tallow::shaders::shared::sample_marks::{ALL_PASSED_OVER, SOME_BARE};
 use tallow::statistics::{Pixel, variance_of_mean};
 
 const SIZES: [[u32; 2]; 6] = [[1, 1], [31, 1], [1, 65], [64, 2], [65, 3], LARGEST];
@@ -47,6 +47,8 @@ impl Frame {
                 light = PixelLight { direct: [20.0; 3], ..PixelLight::default() };
             } else if i % 11 == 4 {
                 light = PixelLight { direct: [0.0; 3], remainder: ALL_PASSED_OVER, ..light };
+            } else if i % 11 == 5 {
+                light.remainder = SOME_BARE;
             }
             let mut mean: vec3 = std::array::from_fn(|c| light.direct[c] + light.albedo[c] * indirect[c]);
             // Unit but for rounding, as those of a render.

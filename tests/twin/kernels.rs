@@ -15,7 +15,7 @@ use tallow::render::settings::{PixelFilter, Settings, Split};
 use tallow::render::{Batch, DeviceScene, Outputs, Renderer, Step, all_effects, called_for, frame_constants};
 use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
-use tallow::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, ASTRAY, PASSED_OVER};
+use tallow::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, ASTRAY, PASSED_OVER, SOME_BARE};
 use tallow::twins::accumulate::fold;
 use tallow::twins::path::{PathSample, Strategy, Tracer};
 use tallow::twins::primary_hit::{guide, seen, through_lens};
@@ -389,8 +389,8 @@ fn marked_samples_are_folded_as_by_the_twin() {
         let mut sample = repeated(pixel, k);
         // The next pixel's samples pass over the key light.
         let [astray, passed_over] = [pixel, (pixel + 1) % REPEATED].map(|p| MARKED[p as usize] >> k & 1);
-        // One shows the sky, before one that passes over the key light.
-        let albedo = if k == 2 && pixel == 3 { 0.0 } else { 1.0 };
+        // One shows the sky, before one that passes over the key light, whose albedo is less than that of the mean.
+        let albedo = if pixel == 3 { [1.0, 1.0, 0.0, 0.5][k as usize] } else { 1.0 };
         sample[2][..3].iter_mut().for_each(|v| *v *= albedo);
         sample[2][3] = ((astray * ASTRAY) | (passed_over * PASSED_OVER)) as f32;
         sample
@@ -412,6 +412,7 @@ fn marked_samples_are_folded_as_by_the_twin() {
     assert_eq!(all(ALL_ASTRAY), marked, "control");
     marked.rotate_left(1);
     assert_eq!(all(ALL_PASSED_OVER), marked, "control");
+    assert_eq!(all(SOME_BARE), (0..REPEATED).map(|pixel| pixel == 3).collect::<Vec<_>>(), "control");
     assert_silent(&gpu);
 }
 

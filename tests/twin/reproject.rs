@@ -15,7 +15,7 @@ use tallow::math::hash::pcg;
 use tallow::render::pass::light_change::SPACINGS;
 use tallow::render::{Carriage, Carried, Reproject, carried_samples, frame_constants};
 use tallow::scene::{Loaded, Pose, Relit, Scene};
-use tallow::shaders::shared::sample_marks::ALL_PASSED_OVER;
+use tallow::shaders::shared::sample_marks::{ALL_PASSED_OVER, SOME_BARE};
 use tallow::twins::camera::{camera_ray, film_from_pixel, film_from_point};
 use tallow::twins::light_change;
 use tallow::twins::path::{Strategy, Tracer};
@@ -340,7 +340,7 @@ fn new_samples_thin_age() {
 fn agreeing([a, b]: &[Begun; 2]) -> usize {
     let close = |a: f32, b: f32| a == b || (a - b).abs() <= 1e-3 * (a.abs() + b.abs()) + 1e-5;
     let values = |(s, l): &(PixelStats, PixelLight)| {
-        [s.mean, s.m2, l.direct, l.albedo, [l.indirect_m2, s.count as f32, (l.remainder >> 30) as f32]].concat()
+        [s.mean, s.m2, l.direct, l.albedo, [l.indirect_m2, s.count as f32, (l.remainder >> 29) as f32]].concat()
     };
     let alike = |i: &usize| {
         let [of_a, of_b] = [values(&a.1[*i]), values(&b.1[*i])];
@@ -387,10 +387,13 @@ fn pixels_without_samples_agree_with_their_twin() {
         let mut stats = film.stats();
         stats.iter_mut().step_by(7).for_each(|s| *s = PixelStats::default());
         film.renderer.film().tiles[0].stats.write(0, &stats).unwrap();
-        // Others know nothing of the key light.
+        // Others know nothing of the key light, which brings the rest something.
         let mut light = film.light();
+        light.iter_mut().for_each(|l| l.direct = [0.25; 3]);
         let unlit = |l: &mut PixelLight| (l.direct, l.remainder) = ([0.0; 3], ALL_PASSED_OVER);
         (0..light.len()).filter(|i| i % 49 < 20 || i % 4 == 0).for_each(|i| unlit(&mut light[i]));
+        // And some show a lamp, too.
+        light.iter_mut().skip(1).step_by(4).for_each(|l| (l.direct, l.remainder) = ([0.5; 3], SOME_BARE));
         film.renderer.film().tiles[0].light.write(0, &light).unwrap();
         let camera = turned(film.camera, 0.4);
         let begun = both(&mut film, &scene, by(way), camera);

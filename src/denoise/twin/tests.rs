@@ -187,21 +187,23 @@ fn key_light_that_all_samples_passed_over_is_that_around() {
     film.add_vec3("P", ["X", "Y", "Z"], &places);
     film.add("Z", Samples::F32(vec![5.0; 5]));
     film.add("samples", Samples::U32(vec![4; 5]));
-    let parts = |first: [f32; 3], remainder: u32| {
+    let parts = |first: [f32; 3], marks: [u32; 2]| {
         let mut film = film.clone();
         let ahead = [0.0, 0.0, 1.0];
         film.add_vec3("N", ["X", "Y", "Z"], &[first, ahead, ahead, ahead, ahead]);
-        film.add("light.remainder", Samples::U32(vec![0, 0, remainder, 0, 0]));
+        film.add("light.remainder", Samples::U32(vec![0, marks[0], marks[1], 0, 0]));
         take_apart(&film, Demodulation::Light)
     };
-    let found = parts([1.0, 0.0, 0.0], ALL_PASSED_OVER);
+    let found = parts([1.0, 0.0, 0.0], [0, ALL_PASSED_OVER]);
     // .25 * 2 of the 1 is direct light, and .5 / .25 the rest before albedo.
     assert_eq!((found.sharp[2], found.input.radiance[2]), ([0.5; 3], [2.0, 2.0, 2.0, 4.0]));
     // Turned round, the first tells of 6, at two pixels' distance: weights exp(-1/2) and exp(-2).
     let [near, far] = [-0.5f32, -2.0].map(f32::exp);
     let both = 0.25 * (2.0 * near + 6.0 * far) / (near + far);
-    assert!((parts([0.0, 0.0, 1.0], ALL_PASSED_OVER).sharp[2][0] - both).abs() < 1e-6);
-    assert_eq!(parts([1.0, 0.0, 0.0], 0).sharp[2], [0.0; 3], "control");
+    assert!((parts([0.0, 0.0, 1.0], [0, ALL_PASSED_OVER]).sharp[2][0] - both).abs() < 1e-6);
+    // Direct light beside it is also that of a lamp: the first alone tells.
+    assert!((parts([0.0, 0.0, 1.0], [SOME_BARE, ALL_PASSED_OVER]).sharp[2][0] - 0.25 * 6.0).abs() < 1e-6);
+    assert_eq!(parts([1.0, 0.0, 0.0], [0, 0]).sharp[2], [0.0; 3], "control");
 }
 
 /// Filtered light may be negative beside a key light, and the whole may not; where the colour is filtered as a whole, that is kept.
