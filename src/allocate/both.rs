@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn a_filter_removes_the_noise_of_indirect_light_alone() {
         // One pixel: gathered is 1, so that a filter of share 0.5 leaves half of the variance of indirect light. Radiance 3 of
-        // which 1 is direct; of the squared deviations 8, indirect light has 4.
+        // which 1 is direct, or a key light's 5; of the squared deviations 8, indirect light has 4.
         let push = PriorityPush {
             size: [1, 1],
             window: 2,
@@ -149,9 +149,9 @@ mod tests {
             stride: 1,
             ..PriorityPush::default()
         };
-        let of = |indirect_m2: f32, filtered: f32| {
+        let of = |direct: f32, indirect_m2: f32, filtered: f32| {
             let light =
-                [PixelLight { direct: [1.0; 3], albedo: [0.5; 3], indirect_m2, remainder: 0, ..Default::default() }];
+                [PixelLight { direct: [direct; 3], albedo: [0.5; 3], indirect_m2, remainder: 0, ..Default::default() }];
             let (guide, stats) = ([Guide::default()], [pixel(3.0, 2, 8.0)]);
             let push = PriorityPush { filtered, ..push };
             let [noise] = reference(&HostInputs { guide: &guide, stats: &stats, light: &light, priority: &[], push })
@@ -159,10 +159,12 @@ mod tests {
                 .unwrap();
             noise * noise
         };
-        let whole = of(4.0, 0.0);
-        let shares = [0.0, 4.0, 8.0, 99.0].map(|m2: f32| of(m2, 0.5) / whole);
-        let close = shares.iter().zip([1.0, 0.75, 0.5, 0.5]).all(|(a, b)| (a - b).abs() < 1e-6);
-        assert!(close, "{shares:?}");
+        for direct in [1.0, 5.0] {
+            let whole = of(direct, 4.0, 0.0);
+            let shares = [0.0, 4.0, 8.0, 99.0].map(|m2: f32| of(direct, m2, 0.5) / whole);
+            let close = shares.iter().zip([1.0, 0.75, 0.5, 0.5]).all(|(a, b)| (a - b).abs() < 1e-6);
+            assert!(close, "{direct}: {shares:?}");
+        }
     }
 
     /// Noise of two pixels in one row whose albedos differ by `albedo`.

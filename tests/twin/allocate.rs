@@ -283,7 +283,8 @@ fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>, Ve
     };
     // Some of it brighter than squares of single precision go.
     let light = |i: usize| PixelLight {
-        direct: [0.5 * unit(i), unit(i), 0.0],
+        // A key light may be brighter than the mean, in all channels or in one.
+        direct: [[0.5 * unit(i), unit(i), 0.0], [1.5, 2.5, 0.3], [1.5, unit(i), 0.0]][i % 13 % 3],
         indirect_m2: [unit(4 * i + 1), 0.0, 1e35][i % 7 % 3],
         albedo: if i % 11 == 3 { [0.0; 3] } else { [unit(4 * i + 2), 1.0, 0.5] },
         remainder: 0,
