@@ -46,7 +46,8 @@ impl FrameResources {
         })
     }
 
-    /// Begin and end of each pass of the last recording, in order; empty if the queue has no timestamps.
+    /// Begin and end of each pass of the last recording, in order; empty if the queue has no timestamps, if passes are not timed, and
+    /// after a [`Gpu::run`] that failed before it submitted anything.
     ///
     /// # Errors
     /// [`Error::Device`](crate::error::Error::Device) when that work is not complete,
@@ -120,11 +121,16 @@ impl FrameResources {
     /// The device was lost before.
     pub(super) fn reset(&mut self) -> Result<()> {
         self.gpu().0.answers()?;
-        self.timer.reset();
+        self.forget();
         self.let_go();
         self.uploads.reset();
-        self.shapes.clear();
         self.descriptors.reset()
+    }
+
+    /// Forgets the passes of the last recording, which is complete or was never submitted.
+    pub(super) fn forget(&mut self) {
+        self.timer.reset();
+        self.shapes.clear();
     }
 
     /// Resets, and starts the frame's own command buffer.

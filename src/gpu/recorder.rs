@@ -27,17 +27,21 @@ impl Gpu {
     ///
     /// # Errors
     /// Those of `record`, in which case nothing was submitted, and [`Error::Device`] or [`Error::DeviceLost`] when the device
-    /// fails.
+    /// fails. The frame keeps nothing alive then either.
     pub fn run(
         &self,
         frame: &mut FrameResources,
         record: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
     ) -> Result<Vec<PassTime>> {
         let mut recorder = Recorder::own(self, frame)?;
-        record(&mut recorder)?;
+        let recorded = record(&mut recorder);
         drop(recorder);
-        frame.submit_and_wait()?;
-        frame.let_go();
+        if recorded.is_err() {
+            frame.forget();
+        }
+        let done = recorded.and_then(|()| frame.submit_and_wait());
+        frame.let_go(); // nothing of it runs any more, even if it has failed
+        done?;
         frame.tell()?;
         frame.times()
     }

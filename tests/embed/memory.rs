@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering::SeqCst;
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu, Recorder};
-use tallow::render::{Job, Outputs, Renderer};
+use tallow::render::{Job, Outputs, Renderer, Step};
 use tallow::scene::description::{Description, EnvironmentTable, Mesh, MeshTable};
 use tallow::scene::{Change, Loaded, Scene};
 
@@ -49,6 +49,39 @@ fn frames_hold_no_memory_of_work_that_is_complete() {
     frames.iter_mut().for_each(FrameResources::release);
     assert_eq!(gpu.allocated_bytes(), before, "of submissions");
     assert!(frames.iter().all(|frame| frame.passes().is_ok_and(|passes| !passes.is_empty())));
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// An engine that meets an error drops what it has and makes something smaller: the frame must not hold the rest of it.
+#[test]
+fn frames_hold_no_memory_of_work_that_failed() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let (scene, mut frame) = (scene(), FrameResources::new(&gpu).unwrap());
+    let mut fail = |before_end: &dyn Fn(&Renderer, &mut Recorder) -> Result<(), Error>| {
+        let before = gpu.allocated_bytes();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+        let failed = gpu.run(&mut frame, |rec| {
+            renderer.steps().try_for_each(|step| renderer.record(rec, &step))?;
+            before_end(&renderer, rec)
+        });
+        hooks::WAIT.store(0, SeqCst);
+        assert!(failed.is_err() && gpu.allocated_bytes() > before, "{failed:?}");
+        drop(renderer);
+        assert_eq!(gpu.allocated_bytes(), before, "{failed:?}");
+        frame.times()
+    };
+    let recording = fail(&|renderer, rec| renderer.record(rec, &Step::Reproject)); // it keeps no history
+    assert!(
+        recording.is_ok_and(|times| times.is_empty()),
+        "nothing was submitted, so that there is nothing to wait for"
+    );
+    fail(&|_, _| {
+        hooks::WAIT.store(ash::vk::Result::ERROR_OUT_OF_HOST_MEMORY.as_raw(), SeqCst);
+        Ok(())
+    })
+    .unwrap();
     assert_eq!(engine.messages(), Vec::<String>::new());
 }
 
