@@ -93,7 +93,7 @@ pub(super) const TOGETHER: u32 = 8;
 
 /// Of the first `paths` of a list that is dealt to `rounds`, those of one round.
 pub(super) fn of_round(paths: u64, round: u32, rounds: u32) -> u64 {
-    paths.saturating_sub(round.into()).div_ceil(rounds.into())
+    paths.saturating_sub(round.into()).div_ceil(u64::from(rounds).max(1))
 }
 
 impl Step {
@@ -194,5 +194,13 @@ mod tests {
         let together: Vec<_> = pieces(Step::Uniform(batch), 250).into_iter().map(samples).collect();
         assert_eq!(together, [8, 8, 5]);
         assert_eq!(Step::Start.split(1), None);
+    }
+
+    #[test]
+    fn what_was_listed_bounds_a_step() {
+        let step = |first, paths, rounds| Step::Listed(PathRange { first, paths, round: 0, rounds });
+        assert_eq!(step(3, 9, 2).within(17), Some(step(3, 6, 2)), "9 of 17 are of the first of two rounds");
+        assert_eq!(step(3, 9, 2).within(6), None);
+        assert_eq!(step(0, 9, 0).within(5), Some(step(0, 5, 0)), "a step that no renderer makes, which none records");
     }
 }
