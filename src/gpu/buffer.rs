@@ -132,7 +132,7 @@ impl<T: Pod> Buffer<T> {
     }
 
     /// Makes a [`Location::Device`] buffer that holds `values`. An empty slice becomes a single zero, so that absent data can
-    /// be bound like any other.
+    /// be bound like any other. Where host and device share one memory it waits for no work that runs.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -142,7 +142,7 @@ impl<T: Pod> Buffer<T> {
 
     fn holding(self, values: &[T]) -> Result<Self> {
         let zero = [T::zeroed()];
-        self.write(0, if values.is_empty() { &zero } else { values })?;
+        self.untyped.write_new(bytemuck::cast_slice(if values.is_empty() { &zero } else { values }))?;
         Ok(self)
     }
 

@@ -6,7 +6,7 @@
 //!   every object holds a counted reference to the device ([`Gpu`]).
 //! - Barriers are derived from the accesses that a kernel declares in its GLSL; no caller writes one.
 //! - Device memory holds plain data (`Pod`), for which every bit pattern is a valid value.
-//! - While work submitted here runs, the host does not touch device memory, and nothing that the work uses is freed.
+//! - While work submitted here runs, the host does not touch device memory that the work may use, and nothing that it uses is freed.
 //! - A kernel that gets invalid data computes an invalid result, but it accesses nothing outside its buffers (robust
 //!   buffer access) and its own arrays ([`Bindings`]).
 //!

@@ -3,6 +3,7 @@ use super::commands::Commands;
 use super::{Gpu, Location, Untyped, access};
 use crate::error::{Error, Result};
 use ash::vk;
+use std::sync::RwLockWriteGuard;
 
 /// Largest size of the mapped buffer in bytes.
 const CHUNK: usize = 64 << 20;
@@ -13,12 +14,22 @@ impl Untyped {
     /// # Errors
     /// Those of the device.
     pub(super) fn write(&self, offset: usize, bytes: &[u8]) -> Result<()> {
+        self.put(offset, bytes, Some(self.gpu.0.idle()))
+    }
+
+    /// Writes the first bytes of a buffer that was just made: no work has it yet, so that there is none to wait for.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub(super) fn write_new(&self, bytes: &[u8]) -> Result<()> {
+        self.put(0, bytes, None)
+    }
+
+    fn put(&self, offset: usize, bytes: &[u8], idle: Option<RwLockWriteGuard<'_, ()>>) -> Result<()> {
         self.gpu.0.answers()?;
         let any = vk::MemoryPropertyFlags::empty();
-        let copied = {
-            let _idle = self.gpu.0.idle();
-            self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes))
-        };
+        let copied = self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes));
+        drop(idle); // an upload is work itself
         match copied {
             Some(()) => Ok(()),
             None => upload(self, offset, bytes),

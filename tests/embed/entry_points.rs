@@ -214,7 +214,36 @@ fn a_device_that_goes_on_is_waited_for() {
     assert_eq!((times.unwrap().len(), buffer.read().unwrap()), (1, vec![7]));
 }
 
-/// Memory that the host maps is not touched while a submission runs, whoever asks.
+/// A thread that makes the renderer of another scene does not wait for the one that renders. Where the host cannot write the device's
+/// memory, what it writes is brought by a submission, behind those that run.
+#[test]
+fn a_renderer_is_made_while_a_submission_runs() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let buffer = Buffer::from_slice(&gpu, "in use", &[1u32]).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let ((running, runs), (made, makes)) = (mpsc::channel(), mpsc::channel());
+    let seen = Arc::new(AtomicBool::new(false));
+    let was_seen = seen.clone();
+    *hooks::BEFORE_WAIT.lock().unwrap() = Some(Box::new(move || {
+        running.send(()).unwrap();
+        was_seen.store(makes.recv_timeout(Duration::from_secs(10)).is_ok(), SeqCst);
+    }));
+    std::thread::scope(|scope| {
+        let (gpu, scene) = (&gpu, scene());
+        scope.spawn(move || {
+            runs.recv().unwrap();
+            let _ = made.send(Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap());
+        });
+        gpu.run(&mut frame, |rec| rec.fill(&buffer, 7)).unwrap();
+    });
+    *hooks::BEFORE_WAIT.lock().unwrap() = None;
+    assert!(seen.load(SeqCst) || !gpu.info().unified, "it was made while the submission ran");
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// Memory that the host maps is not touched while a submission that may use it runs, whoever asks.
 #[test]
 fn a_buffer_is_read_and_written_between_submissions() {
     let engine = Engine::new();
