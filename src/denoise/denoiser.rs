@@ -9,7 +9,8 @@ use crate::gpu::{Buffer, Gpu, PixelFormat, Recorder};
 use crate::layout::vec4;
 use crate::render::{OutputView, Renderer};
 
-/// A filter over the films of one renderer. Everything is created in [`Denoiser::new`], nothing later.
+/// A filter over the films of one renderer, whose buffers it keeps: a new renderer takes a new denoiser, since this one would go on showing
+/// the old one's film. Everything is created in [`Denoiser::new`], nothing later.
 pub struct Denoiser {
     noisy: Noisy,
     parts: Demodulated,

@@ -178,7 +178,10 @@ impl<'a> Recorder<'a> {
         let (from, to) = (source.buffer, target.buffer);
         if src.len() != dst.len() || Arc::ptr_eq(from, to) {
             let (from, to, m, n) = (&from.name, &to.name, src.len(), dst.len());
-            return Err(Error::Device(format!("\"{from}\" of {m} elements cannot be copied to \"{to}\" of {n}")));
+            let why = "give two buffers of one length";
+            return Err(Error::Device(format!(
+                "\"{from}\" of {m} elements cannot be copied to \"{to}\" of {n}: {why}"
+            )));
         }
         self.owns(&[source, target])?;
         let region = [vk::BufferCopy { src_offset: source.offset, dst_offset: target.offset, size: source.size }];

@@ -105,8 +105,8 @@ pub struct Gap {
 /// whatever order the files are named. Of what glass shows, albedos may weigh samples otherwise than one render does.
 ///
 /// # Errors
-/// [`Error::Input`] when a file cannot be read or does not belong to the others, [`Error::Device`] when there is not enough
-/// memory, [`Error::Usage`] when there is no file, or when a pixel would have more samples than it can count.
+/// [`Error::Input`] when a file cannot be read or does not belong to the others, [`Error::Memory`] when the host has not enough
+/// of it free, [`Error::Usage`] when there is no file, or when a pixel would have more samples than it can count.
 pub fn merge<P: AsRef<Path>>(files: &[P]) -> Result<Merged> {
     let parts = sorted(files)?;
     let (first, others) =

@@ -48,6 +48,9 @@ impl Outputs {
 
 /// A scene on a device and the kernels to render it, all made in [`Renderer::new`]. Later, only [`Renderer::keep_history`] makes more, and
 /// [`Renderer::update`] allocates memory where the scene has grown.
+///
+/// It has one film. Threads that run or record it at the same time add samples to those of each other, which makes wrong pictures and no
+/// error: give each thread a renderer of its own.
 pub struct Renderer {
     pub(crate) gpu: Gpu,
     pub(super) frame: Frame,

@@ -7,16 +7,17 @@ use crate::render::buffers::FilmTile;
 use bytemuck::Pod;
 use std::mem::offset_of;
 
-/// A result buffer for the caller: pixel `i` of the view (row-major, row 0 at the top) starts at `offset + i * stride`.
+/// A result buffer for the caller: pixel `i` of the view (row-major, row 0 at the top) starts `buffer.offset + offset + i * stride` bytes
+/// from the start of the Vulkan buffer.
 #[derive(Clone, Copy, Debug)]
 pub struct OutputView {
-    /// The Vulkan handle, valid as long as what returned the view.
+    /// The range of a Vulkan buffer that holds the records of all pixels, valid as long as what returned the view.
     pub buffer: RawBuffer,
-    /// Bytes from there to the first pixel's first value.
+    /// Bytes from the start of that range to the first pixel's first value.
     pub offset: u64,
-    /// Bytes from pixel to pixel.
+    /// Bytes from pixel to pixel: a record holds more than one value, so that most are larger than their `format`.
     pub stride: u32,
-    /// Of one pixel.
+    /// How the values of one pixel are laid out.
     pub format: PixelFormat,
     /// Pixels in this view.
     pub pixels: u32,
