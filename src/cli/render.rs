@@ -1,4 +1,5 @@
 //! `tallow render`: a scene becomes image files.
+pub mod black;
 pub mod outputs;
 mod planned;
 mod shot;
@@ -180,6 +181,9 @@ pub fn run(args: &Args) -> Result<Exit> {
         complain("interrupted before the first sample: nothing was written");
         return Ok(Exit::Interrupted);
     };
+    if taken.is_whole() && args.pixel.is_none() {
+        warnings.add(black::why(taken.film(), &scene, settings));
+    }
     taken.resumes_by(plan.as_ref().map_or_else(String::new, |plan| planned::instead(plan, &asked)));
     let written = taken.finish(args, plan.as_ref(), true, &mut warnings)?;
     if !taken.is_whole() {

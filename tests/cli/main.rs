@@ -1,5 +1,6 @@
 //! Tests of the built program: exit codes, printed text and files.
 mod adaptive;
+mod black;
 #[cfg(target_os = "linux")]
 #[path = "../support/child.rs"]
 mod child;

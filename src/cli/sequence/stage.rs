@@ -159,6 +159,7 @@ impl<'a> Stage<'a> {
         if carries {
             report.carriage = Some(self.renderer()?.carriage()?);
         }
+        told.warnings.add(render::black::why(shot.film(), &self.scene, &settings));
         shot.finish(&args, None, false, &mut told.warnings)?;
         told.show(shot.film(), &args)?;
         self.chain = self.chain.with(&self.scene, &settings, self.reproject)?;
