@@ -5,6 +5,7 @@ use crate::command::{complains, film, names, scene};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::time::Duration;
 use tallow::image::{self, Samples, WriteOptions};
 use tempfile::TempDir;
 
@@ -339,6 +340,22 @@ fn ended_by(signal: &str, left: &str, words: &str, spp: u64) {
 fn a_killed_render_goes_on_from_its_checkpoint() {
     ended_by("KILL", "a.partial.exr", "", spp_of_steps(96 * 80));
     ended_by("KILL", "a.partial.exr", "--allocate variance --rounds 20", 100);
+}
+
+/// When a render comes to its plan and when it leaves it depends on the device.
+#[test]
+fn a_render_that_is_still_planned_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let said_after = |milliseconds: u64| {
+        let running = start(&folder, &format!("render {} {SMALL} --time 1000h -o a.exr", scene()));
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        running.send(&["INT"]);
+        String::from_utf8(running.end().stderr).unwrap()
+    };
+    let told = "interrupted while the render was planned: nothing was rendered, and nothing written\n";
+    let mut times = std::iter::successors(Some(200), |last| Some(last * 3 / 2)).take_while(|time| *time < 20_000);
+    assert!(times.any(|time| said_after(time) == told));
+    assert!(names(folder.path()).is_empty());
 }
 
 #[test]

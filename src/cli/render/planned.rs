@@ -2,6 +2,7 @@
 use super::{Args, check_room};
 use crate::cli::common::Warnings;
 use crate::cli::files::Item;
+use crate::cli::interrupt;
 use crate::denoise::filter::Method;
 use crate::error::{Checked, Error, Result};
 use crate::gpu::{Gpu, milliseconds};
@@ -81,6 +82,7 @@ pub fn make(
 ) -> Result<Option<Plan>> {
     let Some(target) = target(args) else { return Ok(None) };
     check_room(args.filter(settings), settings, gpu)?;
+    interrupt::leave_at_once("interrupted while the render was planned: nothing was rendered, and nothing written");
     let methods = args.denoise.map_or_else(|| fitting(gpu, settings, warnings), |method| vec![method]);
     plan::plan(gpu, scene, settings, args.wanted(), &methods, target).map(Some)
 }
