@@ -125,6 +125,9 @@ fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
         m if m.starts_with("string values must be quoted") => {
             "texts stand in quotes, and the values of a list have commas between them"
         }
+        m if BAD_ESCAPE.iter().any(|start| m.starts_with(start)) => {
+            "a backslash between double quotes begins a code, such as \\n: write / in its place, or single quotes"
+        }
         m if m.starts_with("unexpected leading zero") => "no 0 stands before other digits, as in 5, 10 and 0.5",
         m if NO_NUMBER.iter().any(|start| m.starts_with(start)) => NUMBER,
         m if m.starts_with("unexpected key or value") && text.get(at..).is_some_and(|rest| rest.starts_with(',')) => {
@@ -143,9 +146,11 @@ fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
 /// What the parser says of .5, 5., 1e, 5deg and 1.0.0.
 const NO_NUMBER: [&str; 4] = ["invalid mantissa", "invalid fraction", "invalid exponent", "invalid float"];
 
+/// What the parser says of backslashes that begin no code, as those of a path of Windows.
+const BAD_ESCAPE: [&str; 2] = ["missing escaped value", "too few unicode value digits"];
+
 /// How numbers are written.
-const NUMBER: &str =
-    "a number begins and ends with a digit, has one point at most and no unit, such as 0.5, 2.0 or 1e-3";
+const NUMBER: &str = "a number begins and ends with a digit, has one point at most and no unit, such as 0.5, 2.0 or 1e-3; a text stands in quotes";
 
 /// Whether a number with a unit stands at byte `at`, as in 35mm. Numbers without commas between them have none.
 fn has_unit(text: &str, at: usize) -> bool {
@@ -192,7 +197,7 @@ fn word(text: &str, at: usize) -> String {
 /// What a word stands for that is not among the known ones: what other renderers call so, or the known one most like it.
 fn hint(unknown: &str, known: &[&str]) -> Option<String> {
     let of = |value| known.contains(&value);
-    let elsewhere = match unknown {
+    match unknown {
         "area" | "rect" | "quad" | "disk" if of("directional") => {
             return Some("what shines from an area is a mesh whose material has an emission.".to_owned());
         }
@@ -202,19 +207,38 @@ fn hint(unknown: &str, known: &[&str]) -> Option<String> {
         "color" | "power" | "energy" | "strength" if of("irradiance") => {
             return Some("a light has an intensity, or an irradiance where it is directional.".to_owned());
         }
-        "sun" | "distant" => "directional",
-        "matte" | "lambertian" => "diffuse",
-        "metal" => "conductor",
-        "glass" => "dielectric",
-        "plastic" => "coated",
-        "pbr" | "principled" | "disney" => "metallic-roughness",
-        "position" | "translate" | "rotate" | "scale" | "matrix" => "transform",
-        _ => unknown,
-    };
-    let word = if of(elsewhere) { elsewhere } else { unknown };
+        _ => {}
+    }
+    let elsewhere = ELSEWHERE.iter().find(|(here, words)| of(here) && words.contains(&unknown));
+    let word = elsewhere.map_or(unknown, |(here, _)| here);
     let near = nearest(word, known.iter().copied())?;
     (strsim::jaro_winkler(word, near) >= LEAST_LIKENESS).then(|| format!("did you mean \"{near}\"?"))
 }
+
+/// Keys and values, and what other programs call them; of several that are known where the word stands the first counts.
+const ELSEWHERE: [(&str, &[&str]); 21] = [
+    ("directional", &["sun", "distant"]),
+    ("diffuse", &["matte", "lambertian"]),
+    ("conductor", &["metal"]),
+    ("dielectric", &["glass"]),
+    ("coated", &["plastic"]),
+    ("metallic-roughness", &["pbr", "principled", "disney"]),
+    ("cube", &["box"]),
+    ("rectangle", &["plane", "quad", "square"]),
+    ("transform", &["position", "translate", "rotate", "scale", "matrix"]),
+    ("translate", &["position"]),
+    ("shape", &["type"]),
+    ("file", &["path", "image"]),
+    ("target", &["look_at", "lookat"]),
+    ("lens_radius", &["aperture"]),
+    ("color", &["base_color", "albedo", "diffuse", "reflectance"]),
+    ("color_texture", &["texture"]),
+    ("radiance", &["color", "intensity", "strength"]),
+    ("environment", &["sky", "world", "background"]),
+    ("width", &["resolution", "size"]),
+    ("spp", &["samples", "samples_per_pixel", "sample_count"]),
+    ("max_depth", &["depth", "bounces", "max_bounces"]),
+];
 
 /// Words that are less alike, from 0 to 1, are not taken for one another: "sun" and "render" have .5.
 const LEAST_LIKENESS: f64 = 0.7;
@@ -353,15 +377,52 @@ mod tests {
     fn words_without_quotes_and_lists_without_commas_are_told() {
         says("[film]\nfilter = tent", "line 2: texts stand in quotes");
         says("[[mesh]]\nfile = a.obj", "line 2: texts stand in quotes");
+        for name in ["3d.obj", "2nd room.obj", "1.obj", "1e5.png", "3.5.obj"] {
+            says(&format!("[[mesh]]\nfile = {name}"), "in quotes");
+        }
         says("[[mesh]]\nflat = True", "true and false are written so");
         let list = "[camera]\nposition = [0 0 3]";
         ends(list, "line 2: texts stand in quotes, and the values of a list have commas between them");
     }
 
     #[test]
+    fn backslashes_that_begin_no_code_are_told() {
+        for path in [r"C:\dir\b.obj", r"C:\Users\b.obj", r"C:\x\b.obj", r"\\server\share", r"a\ b.obj"] {
+            let text = format!("[[mesh]]\nfile = \"{path}\"");
+            ends(
+                &text,
+                "line 2: a backslash between double quotes begins a code, such as \\n: write / in its place, or single quotes",
+            );
+        }
+        assert!(parse(Path::new("s.toml"), r"mesh = [{ file = 'C:\dir\b.obj' }]").is_ok(), "control");
+    }
+
+    /// By their letters "samples" was "sampler", and "base_color" "specular".
+    #[test]
+    fn words_of_other_programs_are_answered_by_those_of_this_one() {
+        for (text, here) in [
+            ("[render]\nsamples = 4", "spp"),
+            ("[render]\nsamples_per_pixel = 4", "spp"),
+            ("[render]\nmax_bounces = 4", "max_depth"),
+            ("[film]\nresolution = [8, 8]", "width"),
+            ("[camera]\nlook_at = [0, 0, 0]", "target"),
+            ("[environment]\ncolor = 1", "radiance"),
+            ("[sky]\ncolor = 1", "environment"),
+            ("[[mesh]]\ntype = 'cube'", "shape"),
+            ("[[mesh]]\nshape = 'box'", "cube"),
+            ("[[mesh]]\nposition = [0, 1, 0]", "transform"),
+            ("[[mesh]]\ntransform = { position = [0, 1, 0] }", "translate"),
+            ("[[material]]\nbase_color = 1", "color"),
+            ("[[material]]\ntype = 'glass'", "dielectric"),
+        ] {
+            says(text, &format!(": did you mean \"{here}\"?"));
+        }
+    }
+
+    #[test]
     fn numbers_that_are_none_are_told() {
-        let number =
-            "a number begins and ends with a digit, has one point at most and no unit, such as 0.5, 2.0 or 1e-3";
+        let number = "a number begins and ends with a digit, has one point at most and no unit, such as 0.5, 2.0 or 1e-3; a text \
+                      stands in quotes";
         let zero = "no 0 stands before other digits, as in 5, 10 and 0.5";
         let words = [".5", "-.5", "+.5", "5.", "1.e5", "1e", "5deg", "0.5f", "1.0.0", "35mm", "5px", "90°", "5 deg"];
         for (word, told) in words.map(|word| (word, number)).into_iter().chain([("05", zero), ("-010", zero)]) {
