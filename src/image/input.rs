@@ -20,13 +20,24 @@ pub fn open(path: &Path) -> Result<File> {
     }
 }
 
-/// Reads a whole file.
+/// Reads a whole file that is no text, and so not empty.
 ///
 /// # Errors
 /// As [`open`], and [`Error::Memory`].
 pub fn read(path: &Path) -> Result<Vec<u8>> {
-    read_times(path, 1)
+    not_empty(path, read_times(path, 1)?)
 }
+
+/// What a full disk or a copy that was broken off leaves behind is named as that.
+fn not_empty(path: &Path, bytes: Vec<u8>) -> Result<Vec<u8>> {
+    match bytes.is_empty() {
+        true => Err(Error::input(path, "is empty: take another copy of it")),
+        false => Ok(bytes),
+    }
+}
+
+/// Bytes of memory that a byte of JSON takes at most while it is read.
+pub const BYTES_OF_JSON: u64 = 64;
 
 /// Reads a whole text file, if there is memory for `times` its size, which its content will take.
 ///
@@ -70,7 +81,7 @@ fn head(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
 /// As [`read`], and for a file of another kind.
 pub fn read_image(path: &Path) -> Result<Vec<u8>> {
     let mut file = open(path)?;
-    let head = head(&mut file).map_err(|e| Error::input(path, remedy(&e)))?;
+    let head = not_empty(path, head(&mut file).map_err(|e| Error::input(path, remedy(&e)))?)?;
     match super::is_image(&head) {
         true => read_rest(path, file, head, 1),
         false => Err(Error::input(path, NO_IMAGE)),

@@ -5,6 +5,7 @@ use super::work::Work;
 use super::{Ceilings, FrameRun};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Pass, PassTime, total_ms};
+use crate::image::input::{self, BYTES_OF_JSON};
 use crate::machine;
 use crate::render::settings::Settings;
 use crate::render::{Counters, traces_paths};
@@ -214,9 +215,11 @@ impl Profile {
         struct Version {
             schema: u32,
         }
-        let text = std::fs::read_to_string(path).map_err(|e| Error::input(path, format!("cannot be read: {e}")))?;
-        let refused = |e: serde_json::Error| Error::input(path, format!("is no profile of tallow: {e}"));
-        let Version { schema } = serde_json::from_str(&text).map_err(refused)?;
+        let text = input::read_text(path, BYTES_OF_JSON)?;
+        let refused = |e: serde_json::Error| {
+            Error::input(path, format!("is no profile, which tallow profile --json prints: {e}"))
+        };
+        let Version { schema } = serde_json::from_slice(&text).map_err(refused)?;
         if schema != SCHEMA {
             let remedy = "profile again, or use the tallow that wrote it";
             return Err(Error::input(
@@ -224,7 +227,7 @@ impl Profile {
                 format!("is a profile of version {schema}, this tallow reads {SCHEMA}: {remedy}"),
             ));
         }
-        serde_json::from_str(&text).map_err(refused)
+        serde_json::from_slice(&text).map_err(refused)
     }
 }
 

@@ -112,6 +112,56 @@ fn words_of_other_programs_are_answered_by_those_of_this() {
 }
 
 #[test]
+fn files_in_the_place_of_others_are_told_by_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    std::fs::write(folder.path().join("s.toml"), "").unwrap();
+    let run = |words: &str| tallow(&folder, &words.split(' ').collect::<Vec<_>>());
+    // Its default output would replace it.
+    complains(&run("render a.exr"), 3, &["error: a.exr: is no scene: \"exr\" is none of toml, obj"]);
+    complains(
+        &run("profile s.toml --compare a.exr"),
+        3,
+        &["a.exr: is no profile, which tallow profile --json prints: "],
+    );
+    complains(
+        &run("sequence s.toml -o a.gif"),
+        2,
+        &["a.gif: frames go to .exr, .png or .hdr files; --preview a.gif writes"],
+    );
+    for number in ["0", "-1", "nan", "inf"] {
+        let refused = run(&format!("filter a.exr -o b.exr --samples {number}"));
+        complains(&refused, 2, &["--samples", "expected a number of at least 1, or the name of a layer"]);
+    }
+    complains(&run("filter a.exr -o b.exr --samples spp"), 3, &["holds no single layer \"spp\""]);
+}
+
+/// As a full disk or a copy that was broken off leaves them.
+#[test]
+fn empty_files_are_told_to_be_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    for name in ["empty.exr", "empty.png", "empty.glb", "empty.gltf", "empty.hdr"] {
+        std::fs::write(folder.path().join(name), "").unwrap();
+    }
+    std::fs::write(folder.path().join("sky.toml"), "environment.file = 'empty.hdr'").unwrap();
+    let picture = "[[material]]\nname = 'a'\ncolor_texture = 'empty.png'\n[[mesh]]\nshape = 'cube'\nmaterial = 'a'\n";
+    std::fs::write(folder.path().join("picture.toml"), picture).unwrap();
+    for (words, name) in [
+        ("compare a.exr empty.exr", "empty.exr"),
+        ("merge empty.exr a.exr -o b.exr", "empty.exr"),
+        ("filter empty.png -o b.exr", "empty.png"),
+        ("render empty.glb", "empty.glb"),
+        ("render empty.gltf", "empty.gltf"),
+        ("render sky.toml -o b.exr", "empty.hdr"),
+        ("render picture.toml -o b.exr", "empty.png"),
+    ] {
+        let output = tallow(&folder, &words.split(' ').collect::<Vec<_>>());
+        complains(&output, 3, &[&format!("{name}: is empty: take another copy of it")]);
+    }
+}
+
+#[test]
 fn input_errors_name_the_file_and_exit_3() {
     let folder = tempfile::tempdir().unwrap();
     write(&folder, "a.exr", 12, 0.5);

@@ -180,7 +180,7 @@ fn bad_profiles_and_options_are_one_line() {
     std::fs::write(folder.path().join("newer.json"), "{\"schema\": 2, \"what\": []}").unwrap();
     std::fs::write(folder.path().join("list.json"), "[1, 2]").unwrap();
     std::fs::write(folder.path().join("empty.json"), "{\"schema\": 1}").unwrap();
-    complains(&run(&["half.json"]), 3, &["half.json", "no profile of tallow"]);
+    complains(&run(&["half.json"]), 3, &["half.json", "no profile, which tallow profile --json prints"]);
     complains(&run(&[BOX, "--compare", "newer.json"]), 3, &["newer.json", "version 2", "reads 1"]);
     complains(&run(&[BOX, "--compare", "list.json"]), 3, &["list.json", "no profile"]);
     complains(&run(&["empty.json"]), 3, &["empty.json", "missing field"]);

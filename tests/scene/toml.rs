@@ -393,6 +393,8 @@ fn what_is_legal_but_odd_is_a_warning() {
     assert!(bright.warnings[0].contains("outside [0, 1]: clamped"), "{:?}", bright.warnings);
     let missing = parse("[[material]]\nname = \"a\"\ncolor_texture = \"no.png\"").unwrap();
     assert!(missing.warnings[0].contains("no.png: no such file"), "{:?}", missing.warnings);
+    let folder = parse("[[material]]\nname = \"a\"\ncolor_texture = \".\"").unwrap();
+    assert!(folder.warnings[0].contains(".: is a folder; its constant colour"), "{:?}", folder.warnings);
 }
 
 #[test]

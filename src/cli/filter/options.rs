@@ -1,6 +1,7 @@
 //! Options of `tallow filter` for layers and filter settings.
 use crate::cli::common::with_ranges;
 use crate::denoise::filter::{FilterOverrides, FilterSettings, Method, readers};
+use crate::error::Checked;
 use crate::image::aov::{Aov, Names};
 use clap::builder::PossibleValue;
 use clap::{Arg, ValueEnum};
@@ -29,8 +30,18 @@ pub struct Layers {
     #[arg(long, value_name = "NAME")]
     pub variance: Option<String>,
     /// Samples per pixel, or a number, which all pixels have
-    #[arg(long, value_name = "NAME or N")]
+    #[arg(long, value_name = "NAME or N", value_parser = samples)]
     pub samples: Option<String>,
+}
+
+/// A number that counts no samples is not taken for a name.
+fn samples(text: &str) -> Checked<String> {
+    match text.parse::<f32>() {
+        Ok(number) if !(number >= 1.0 && number.is_finite()) => {
+            Err("expected a number of at least 1, or the name of a layer".to_owned())
+        }
+        _ => Ok(text.to_owned()),
+    }
 }
 
 impl Layers {

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::image::difference::false_colours;
 use crate::image::output::{self, Stream};
 use crate::image::{self, Film, WriteOptions};
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneFile};
 use std::path::{Path, PathBuf};
 
 /// A render may take hours; what cannot be written, or would replace what it is not to, is told before.
@@ -16,6 +16,10 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// [`crate::error::Error::Usage`] and [`crate::error::Error::Output`].
 pub fn check(args: &Args) -> Result<()> {
+    if !SceneFile::is_named(&args.scene) {
+        // The default output of an image would have its name.
+        SceneFile::open(&args.scene)?;
+    }
     let (images, checkpoint) = (args.output_files(), checkpoint::path(&args.output_files(), &args.scene));
     images.iter().try_for_each(|path| image::check_writable(path))?;
     args.heatmap.iter().try_for_each(|path| check_png("--heatmap", path))?;

@@ -6,16 +6,13 @@ use crate::cli::interrupt;
 use crate::denoise::filter::Method;
 use crate::error::{Checked, Error, Result};
 use crate::gpu::{Gpu, milliseconds};
-use crate::image::input;
+use crate::image::input::{self, BYTES_OF_JSON};
 use crate::plan::{self, Plan, Target};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::settings::entry;
 use std::path::Path;
 use std::time::Duration;
-
-/// Bytes of memory that a byte of a plan takes at most while it is read.
-const BYTES_OF_JSON: u64 = 64;
 
 /// Parses a time such as `200ms`, `2s` or `1m 30s`.
 pub fn duration(text: &str) -> Checked<Duration> {

@@ -8,7 +8,7 @@ mod survey;
 use super::common::{Warnings, frames_per_second, with_ranges};
 use super::files::{check_not_of_scene, key, scene_name};
 use super::render::{self, outputs};
-use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
+use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json, quoted};
 use crate::error::{Error, Result};
 use crate::image::{self, Film, output::is_special};
 use crate::render::{Carriage, Reproject, ReprojectOverrides};
@@ -153,6 +153,13 @@ impl Args {
                 "--{option} is for one image: leave it out, or use tallow render; a sequence takes the samples that --spp says, and \
                  goes on by itself where it stopped"
             )));
+        }
+        let is_gif = |file: &&PathBuf| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif"));
+        if let Some(file) = self.render.outputs.iter().find(is_gif) {
+            let (name, option) = (file.display(), quoted(&file.display().to_string()));
+            let what =
+                format!("frames go to .exr, .png or .hdr files; --preview {option} writes a moving picture of them");
+            return Err(Error::Usage(format!("{name}: {what}")));
         }
         if let Some(method) = self.render.denoise {
             method.check()?;

@@ -165,7 +165,9 @@ impl TextureSet {
     pub fn request(&mut self, dir: &Path, file: &str, kind: Kind, mapping: Mapping, warn: &mut Vec<String>) -> u32 {
         let in_memory = self.in_memory.contains_key(Path::new(file)).then(|| (file.into(), false));
         let Some((path, mended)) = in_memory.or_else(|| find_file(dir, file)) else {
-            warn.push(format!("texture {}: no such file; its constant colour is used", dir.join(file).display()));
+            let path = dir.join(file);
+            let why = if path.is_dir() { "is a folder" } else { "no such file" };
+            warn.push(format!("texture {}: {why}; its constant colour is used", path.display()));
             return NONE;
         };
         if mended {
