@@ -345,20 +345,33 @@ fn numbers_of_keys_are_checked_when_the_scene_is_loaded() {
     let at_two = |what: &str, key: &str, from: f64, to: f64| {
         table(what, &format!("{{ time = 0, {key} = {from} }}, {{ time = 2.5, {key} = {to} }}"))
     };
-    let (grey, bulb) = ("material = \"grey\"", "light = \"bulb\"");
+    let (grey, bulb, moved) = ("material = \"grey\"", "light = \"bulb\"", "instance = \"box\"");
+    let sound = |tables: &str| {
+        tables.replace("-1", "1").replace("200e12", "20").replace("200000000000000", "20").replace("200", "20")
+    };
+    // What is too small to be seen reaches nowhere.
+    assert!(
+        Scene::parse(
+            Path::new("s.toml"),
+            &(STAGE.to_owned() + &table(moved, "{ time = 0, scale = 0, translate = [9e12, 0, 0] }"))
+        )
+        .is_ok()
+    );
     for (tables, words) in [
         (at_two("environment = true", "radiance", 1.0, -1.0), "environment: radiance [-1.0, -1.0, -1.0] is negative"),
         (at_two(grey, "emission", 0.0, -1.0), "material \"grey\": emission [-1.0, -1.0, -1.0] is negative"),
         (at_two(grey, "opacity", 1.0, -1.0), "material \"grey\": opacity is -1"),
         (at_two(bulb, "intensity", 1.0, -1.0), "light 0: "),
         (at_two("camera = true", "fov", 40.0, 200.0), "camera: fov is 200"),
+        (at_two(moved, "scale", 1.0, 200e12), "instance 0 would reach beyond the limit of 1e12"),
+        (
+            table(moved, "{ time = 0, translate = [1, 2, 3] }, { time = 2.5, translate = [0, 200e12, 0] }"),
+            "instance 0 would reach beyond the limit of 1e12",
+        ),
     ] {
         let line = error(&tables);
         assert!(line.contains("animation 1") && line.contains("key 2, at 2.5: ") && line.contains(words), "{line}");
-        assert!(
-            Scene::parse(Path::new("s.toml"), &(STAGE.to_owned() + &tables.replace("-1", "1").replace("200", "20")))
-                .is_ok()
-        );
+        assert!(Scene::parse(Path::new("s.toml"), &(STAGE.to_owned() + &sound(&tables))).is_ok());
     }
     let warnings = |to: f64| {
         let text = STAGE.to_owned() + &at_two(grey, "color", 0.5, to);

@@ -135,7 +135,7 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
         if copy == NONE {
             return Err(format!("instance {number} is fixed: it has no triangles"));
         }
-        let affine = scene.rig.own.get(&copy).map_or(transform.0, |own| transform.0 * *own);
+        let affine = placed_by(scene, copy, transform);
         if !affine.is_finite() {
             return Err(format!("instance {number} gets a transform with NaN or infinite numbers"));
         }
@@ -161,6 +161,25 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
         seen(&copies, tree_of, &flat, &bounds, farthest).map_err(|what| format!("instances {what}"))?;
     check_none_lost(scene, &copies, &hidden, world).map_err(|[place, what]| format!("{place}: {what}"))?;
     Ok(NextCopies { all: copies, flat, hidden, world })
+}
+
+/// Where a transform puts a copy, which may be moved within what is placed.
+fn placed_by(scene: &Scene, copy: u32, transform: &Transform) -> DAffine3 {
+    scene.rig.own.get(&copy).map_or(transform.0, |own| transform.0 * *own)
+}
+
+/// Checks that what is placed stays within the limit of coordinates, whatever else moves. What is not placed or not seen reaches nowhere.
+fn stays_within(scene: &Scene, number: usize, transform: &Transform) -> Checked {
+    let Some(&copy) = scene.rig.placed.get(number).filter(|copy| **copy != NONE) else { return Ok(()) };
+    let affine = placed_by(scene, copy, transform);
+    if !Transform::from(affine).has_inverse() {
+        return Ok(());
+    }
+    let tree = &scene.rig.trees[scene.rig.tree_of[copy as usize] as usize];
+    let root = tree.nodes.start as u32;
+    let farthest = |_, direction| bvh::farthest(&scene.nodes, root, &scene.triangles, direction);
+    let reach = seen(&[instance(&affine, root)], &[0], &HashSet::new(), &[tree.bounds], farthest);
+    reach.map(drop).map_err(|what| format!("instance {number} would {what}"))
 }
 
 /// Checks what only now emits light or has holes, which the scene could not know when it chose spheres or meshes.
@@ -222,7 +241,7 @@ fn material_name(scene: &Scene, index: usize) -> String {
     }
 }
 
-/// Checks what a pose says of materials, lights, sky and camera, and returns warnings of reflectances that are clamped.
+/// Checks what a pose says of places, materials, lights, sky and camera, and returns warnings of reflectances that are clamped.
 ///
 /// # Errors
 /// A sentence with what cannot be.
@@ -235,6 +254,7 @@ pub fn check_numbers(scene: &Scene, pose: &Pose) -> Checked<Vec<String>> {
         next_light(lights, *index, table)?;
     }
     next_of_sky(scene, pose)?;
+    pose.instances.iter().try_for_each(|(number, transform)| stays_within(scene, *number, transform))?;
     if let Some(camera) = &pose.camera {
         camera.build([1, 1], scene.bounds).map_err(|what| format!("camera: {what}"))?;
     }
