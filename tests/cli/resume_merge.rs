@@ -112,6 +112,27 @@ fn neither_believes_what_cannot_be() {
     well(render(&folder, "--spp 4 --resume good.exr -o resumed.exr"));
 }
 
+/// Priorities of round 1 are as noisy as the samples before: sums of such squares are beyond the largest float.
+#[test]
+fn priorities_that_are_no_numbers_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "--spp 16 --allocate variance --min-spp 4 --rounds 2";
+    well(render(&folder, &format!("{words} -o a.exr")));
+    let mut film = read(&folder, "a.exr");
+    counts(&mut film, "samples").fill(4);
+    ranges(&mut film, r#"[{"seed":0,"first":0,"count":4}]"#);
+    film.metadata.insert("allocations".to_owned(), "1".to_owned());
+    write(&folder, "sound.exr", &film);
+    for channel in ["m2.R", "m2.G"] {
+        floats(&mut film, channel)[9] = 3e38;
+    }
+    write(&folder, "noisy.exr", &film);
+    // Of the pixel and its neighbours, whose noise it is part of.
+    let told = ["warning: 9 priorities were not finite and counted for nothing"];
+    complains(&render(&folder, &format!("{words} --resume noisy.exr -o b.exr")), 0, &told);
+    well(render(&folder, &format!("{words} --resume sound.exr -o b.exr")));
+}
+
 /// As other tools replace their input; what cannot be written whole replaces nothing.
 #[test]
 fn a_part_that_the_merged_render_replaces_is_named_and_never_lost() {
