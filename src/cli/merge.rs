@@ -33,7 +33,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         let name = args.output.display();
         return Err(Error::Usage(format!("{name}: a merged render keeps all of its layers: choose a name with .exr")));
     }
-    let Merged { film, gaps, filtered } = render::merge(&args.files)?;
+    let Merged { film, gaps, filtered, programs } = render::merge(&args.files)?;
     let replaced = args.files.iter().find(|part| key(part) == key(&args.output));
     image::write(&args.output, &film, &WriteOptions::default())?;
     if let Some(part) = replaced {
@@ -42,6 +42,10 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let missing = |Gap { seed, first, last }| format!("samples {first} to {last} of seed {seed} are missing");
     Warnings::new(true).insist(gaps.into_iter().map(missing));
+    if programs.len() > 1 {
+        let programs = Vec::from_iter(programs).join(" and ");
+        complain(&format!("note: the parts are of {programs}: their layers direct and albedo may hold other light"));
+    }
     if let Some((part, filter)) = filtered.first() {
         let (part, output) = (part.display(), quoted(&args.output.display().to_string()));
         complain(&format!(

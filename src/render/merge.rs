@@ -3,9 +3,10 @@ use super::film;
 use super::provenance::{self, Provenance, SampleRange};
 use super::rendered::{Head, Rendered};
 use crate::error::{Error, Result};
-use crate::image::{self, FILTERED, Film};
+use crate::image::{self, FILTERED, Film, SOFTWARE};
 use crate::render::settings::Settings;
 use crate::statistics::{BrokenSamples, Pixel, join};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Settings in which merged renders may differ.
@@ -15,6 +16,8 @@ const FREE: [&str; 3] = ["spp", "first_sample", "seed"];
 struct Part<'a> {
     path: &'a Path,
     splits_light: bool,
+    /// The program that rendered it, with its version.
+    program: String,
     settings: Settings,
     /// Its settings are all but [`FREE`].
     provenance: Provenance,
@@ -22,12 +25,14 @@ struct Part<'a> {
 
 impl<'a> Part<'a> {
     fn open(path: &'a Path) -> Result<Self> {
-        let head = Head::of(&image::read_head(path)?).map_err(|what| Error::input(path, what))?;
+        let film = image::read_head(path)?;
+        let head = Head::of(&film).map_err(|what| Error::input(path, what))?;
+        let program = film.metadata.get(SOFTWARE).map_or("an unknown program", String::as_str).to_owned();
         let Head { mut provenance, settings: own, splits_light } = head;
         if let Some(settings) = provenance.settings.as_object_mut() {
             settings.retain(|key, _| !FREE.contains(&key.as_str()));
         }
-        Ok(Self { path, splits_light, settings: own, provenance })
+        Ok(Self { path, splits_light, program, settings: own, provenance })
     }
 
     /// Reads the samples.
@@ -87,6 +92,8 @@ pub struct Merged {
     pub gaps: Vec<Gap>,
     /// The parts whose pictures were filtered, and by what. The merged picture is not.
     pub filtered: Vec<(PathBuf, String)>,
+    /// What rendered the parts, by name and version. Where there are several, their layers of light may be told apart by other rules.
+    pub programs: BTreeSet<String>,
 }
 
 /// Samples that lie between those of a merged film.
@@ -123,12 +130,13 @@ pub fn merge<P: AsRef<Path>>(files: &[P]) -> Result<Merged> {
         broken = BrokenSamples::join(broken, rendered.broken);
         pixels.iter_mut().zip(&rendered.pixels).for_each(|(a, b)| *a = join(a, b));
     }
+    let programs = parts.iter().map(|part| part.program.clone()).collect();
     let samples = closed_up(ranges);
     film::replace_pixels(&mut film, &pixels);
     film::set_broken_samples(&mut film, broken);
     film.channels.retain(|c| c.name != film::PENDING && c.name != film::PRIORITY);
     provenance::set_samples(&mut film, &samples)?;
-    Ok(Merged { film, gaps: gaps(&samples), filtered })
+    Ok(Merged { film, gaps: gaps(&samples), filtered, programs })
 }
 
 /// The files by their first samples, if they can be merged.

@@ -133,6 +133,22 @@ fn priorities_that_are_no_numbers_are_told() {
     well(render(&folder, &format!("{words} --resume sound.exr -o b.exr")));
 }
 
+/// Versions may tell direct light from indirect by other rules.
+#[test]
+fn parts_of_other_versions_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    well(render(&folder, "--spp 2 -o a.exr"));
+    well(render(&folder, "--spp 2 --first-sample 2 -o b.exr"));
+    let mut older = read(&folder, "b.exr");
+    older.metadata.insert("software".to_owned(), "tallow 0.0.1".to_owned());
+    write(&folder, "older.exr", &older);
+    let own = concat!("tallow ", env!("CARGO_PKG_VERSION"));
+    let told =
+        format!("note: the parts are of tallow 0.0.1 and {own}: their layers direct and albedo may hold other light");
+    complains(&run(&folder, "merge a.exr older.exr -o whole.exr"), 0, &[&told]);
+    well(run(&folder, "merge a.exr b.exr -o whole.exr"));
+}
+
 /// As other tools replace their input; what cannot be written whole replaces nothing.
 #[test]
 fn a_part_that_the_merged_render_replaces_is_named_and_never_lost() {
