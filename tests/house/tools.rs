@@ -26,7 +26,7 @@ chmod +x \"$target/release/tallow\"
 ";
 
 /// Stands for cargo where it packages, and checks the package, which fails where there is a glslc. What the package is built of is that of
-/// the repository, unless a file `damage` names a file to spoil.
+/// the repository, unless a file `damage` names a file to spoil. It leaves out sources that are called `left_out`.
 const PACKAGES: &str = "#!/bin/sh
 makes() {
     printf '%s\\n' \"include_bytes!($1/spirv/path.spv)\" >\"$1/shaders.rs\"
@@ -35,17 +35,18 @@ makes() {
 case \"$*\" in
 *--offline*)
     if [ -n \"$(command -v glslc)\" ]; then exit 1; fi
-    makes \"$CARGO_TARGET_DIR/packaged\" ;;
+    makes \"$CARGO_TARGET_DIR/packaged\"
+    damage=$CARGO_TARGET_DIR/../damage
+    if [ -e \"$damage\" ]; then read -r file <\"$damage\"; echo spoilt >\"$CARGO_TARGET_DIR/packaged/$file\"; fi ;;
 *--lib*)
     for out in out packaged; do
         mkdir -p \"$CARGO_TARGET_DIR/$out/spirv\"
         : >\"$CARGO_TARGET_DIR/$out/spirv/path.spv\"
     done
-    if [ -e damage ]; then cp damage \"$CARGO_TARGET_DIR/packaged/$(cat damage)\"; fi
     makes \"$CARGO_TARGET_DIR/out\" ;;
 package*)
     mkdir -p \"$CARGO_TARGET_DIR/package\"
-    tar -czf \"$CARGO_TARGET_DIR/package/tallow-1.crate\" --transform 's,^,tallow-1/,' spirv src ;;
+    tar -czf \"$CARGO_TARGET_DIR/package/tallow-1.crate\" --exclude left_out --transform 's,^,tallow-1/,' spirv src ;;
 esac
 ";
 
@@ -168,10 +169,18 @@ fn a_package_is_checked_without_a_glslc_that_lies_beside_cargo() {
     scripts.stand_in("repository/target/release/tallow", "#!/bin/sh\nfor file; do :; done\necho picture >\"$file\"\n");
     let [_, err] = said(scripts.command("tools/package").arg("--check"));
     assert!(err.contains("1 kernels") && err.ends_with("is the program of the repository and renders\n"), "{err}");
-    fs::write(scripts.path("repository/damage"), "spirv/path.spv").unwrap();
-    let output = scripts.command("tools/package").arg("--check").output().unwrap();
-    let err = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && err.ends_with("the packaged crate differs from the repository\n"), "{err}");
+    let differs = || {
+        let output = scripts.command("tools/package").arg("--check").output().unwrap();
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && err.ends_with("the packaged crate differs from the repository\n"), "{err}");
+    };
+    for of_build in ["spirv/path.spv", "shaders.rs"] {
+        fs::write(scripts.path("repository/damage"), of_build).unwrap();
+        differs();
+    }
+    fs::remove_file(scripts.path("repository/damage")).unwrap();
+    fs::write(scripts.path("repository/src/left_out"), "").unwrap();
+    differs();
 }
 
 #[test]
