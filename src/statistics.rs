@@ -104,7 +104,7 @@ fn is_all(p: &Pixel, mark: u32) -> bool {
 fn with_key_light(part: &Pixel, other: &Pixel) -> Pixel {
     let mut part = *part;
     let largest = |p: &Pixel| p.light.albedo.into_iter().fold(0.0, f32::max);
-    let whole = other.light.remainder & SOME_BARE == 0;
+    let whole = (part.light.remainder | other.light.remainder) & SOME_BARE == 0;
     let one_surface = whole && largest(other) > ONE_SURFACE * largest(&part);
     if one_surface && is_all(&part, ALL_PASSED_OVER) && !is_all(other, ALL_PASSED_OVER) {
         let light = &mut part.light;
@@ -188,6 +188,8 @@ mod tests {
         // Where the other part shows a lamp, too, what it sends is not counted for both.
         let bare = lit(1.5, SOME_BARE, &[3.0, 5.0]);
         assert_eq!([light(&unlit, &bare), light(&bare, &usual)], [([0.75; 3], SOME_BARE), ([1.5; 3], SOME_BARE)]);
+        let merged = lit(0.5, ALL_PASSED_OVER | SOME_BARE, &[3.0, 5.0]);
+        assert_eq!(light(&merged, &usual), ([1.0; 3], SOME_BARE), "as reprojection merges them");
         let some = of(&[1.0, 2.0]);
         assert_eq!((join(&some, &Pixel::default()), join(&Pixel::default(), &some)), (some, some));
         assert_eq!(join(&Pixel::default(), &Pixel::default()), Pixel::default());

@@ -35,7 +35,7 @@ pub(crate) const INDIRECT_M2: &str = "indirect.m2";
 /// How far the lens blurs what a pixel shows, from 0, sharp, to 1: only in files of cameras with a lens.
 pub(crate) const BLUR: &str = "denoising blur";
 
-/// What rounding took off the means of direct light and albedo, and what no sample of a pixel has seen, as
+/// What rounding took off the means of direct light and albedo, and what the samples of a pixel have seen or not, as
 /// [`crate::layout::PixelLight::remainder`]: only in files where that is not 0.
 pub(crate) const LIGHT_REMAINDER: &str = "light.remainder";
 /// What rounding took off the means of pixels with thousands of samples: only in files that have such pixels; and [`LIGHT_REMAINDER`].
@@ -162,7 +162,8 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
     }
 }
 
-/// Only pixels with thousands of samples, that show glass, or none of whose samples chose the key light have remainders.
+/// Only pixels with thousands of samples, that show glass, or some of them the sky or a lamp beside a key light, which others never chose,
+/// have remainders.
 fn drop_remainders_of_none(film: &mut Film) {
     let is_zero = |samples: &Samples| matches!(samples, Samples::U32(words) if words.iter().all(|&word| word == 0));
     film.channels.retain(|c| !(REMAINDERS.contains(&c.name.as_str()) && is_zero(&c.samples)));

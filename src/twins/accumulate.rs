@@ -8,8 +8,9 @@ use crate::shaders::shared::sample_marks::{ALL_ASTRAY, ALL_PASSED_OVER, ASTRAY, 
 use crate::statistics::next_sample;
 use glam::{Vec3, Vec4};
 
-/// Bits of a mean's remainder, for each channel.
+/// Bits of a mean's remainder, for each channel, of all light.
 const BITS: u32 = shaders::accumulate::BITS as u32;
+/// Of direct light, and of albedo.
 const DIRECT_BITS: u32 = shaders::accumulate::DIRECT_BITS as u32;
 const ALBEDO_BITS: u32 = shaders::accumulate::ALBEDO_BITS as u32;
 
@@ -20,7 +21,7 @@ struct Split {
     albedo: Vec3,
 }
 
-/// Parts the light of sample number `count`. w of `noted` holds its marks: see the kernel.
+/// Parts the light of sample number `count`. w of `noted` holds its marks: see the kernel, which without FX_SOFT leaves [`SOME_BARE`] out.
 fn split(l: &mut PixelLight, direct: Vec3, radiance: Vec3, noted: Vec4, count: u32) -> Split {
     let marks = noted.w as u32;
     let albedo = albedo_along(l, noted.truncate(), marks & ASTRAY != 0, count);
