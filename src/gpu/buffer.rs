@@ -142,7 +142,7 @@ impl<T: Pod> Buffer<T> {
 
     fn holding(self, values: &[T]) -> Result<Self> {
         let zero = [T::zeroed()];
-        self.untyped.write_new(bytemuck::cast_slice(if values.is_empty() { &zero } else { values }))?;
+        self.write_new(0, if values.is_empty() { &zero } else { values })?;
         Ok(self)
     }
 
@@ -188,11 +188,25 @@ impl<T: Pod> Buffer<T> {
     /// # Errors
     /// [`Error::Device`] when they do not fit, or the copy fails.
     pub fn write(&self, offset: usize, values: &[T]) -> Result<()> {
-        if offset.checked_add(values.len()).is_none_or(|end| end > self.len) {
-            let (name, count, len) = (&self.untyped.name, values.len(), self.len);
+        self.untyped.write(self.place(offset, values.len())?, bytemuck::cast_slice(values))
+    }
+
+    /// As [`Self::write`], into a buffer that was just made: no work has it yet, so that it waits for none where host and device share
+    /// one memory.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub(crate) fn write_new(&self, offset: usize, values: &[T]) -> Result<()> {
+        self.untyped.write_new(self.place(offset, values.len())?, bytemuck::cast_slice(values))
+    }
+
+    /// Bytes from the start of the memory to so many elements from `offset` on, where they fit.
+    fn place(&self, offset: usize, count: usize) -> Result<usize> {
+        if offset.checked_add(count).is_none_or(|end| end > self.len) {
+            let (name, len) = (&self.untyped.name, self.len);
             return Err(Error::Device(format!("buffer \"{name}\": {count} elements at {offset} exceed its {len}")));
         }
-        self.untyped.write((self.first + offset) * size_of::<T>(), bytemuck::cast_slice(values))
+        Ok((self.first + offset) * size_of::<T>())
     }
 
     /// Waits for the work that [`Gpu::run`] submitted, then returns all elements. For work recorded with

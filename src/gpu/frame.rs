@@ -47,7 +47,7 @@ impl FrameResources {
     }
 
     /// Begin and end of each pass of the last recording, in order; empty if the queue has no timestamps, if passes are not timed, and
-    /// after a [`Gpu::run`] that failed before it submitted anything.
+    /// after a [`Gpu::run`] that failed.
     ///
     /// # Errors
     /// [`Error::Device`](crate::error::Error::Device) when that work is not complete,
@@ -127,7 +127,7 @@ impl FrameResources {
         self.descriptors.reset()
     }
 
-    /// Forgets the passes of the last recording, which is complete or was never submitted.
+    /// Forgets the passes of the last recording.
     pub(super) fn forget(&mut self) {
         self.timer.reset();
         self.shapes.clear();

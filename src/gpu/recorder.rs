@@ -36,12 +36,12 @@ impl Gpu {
         let mut recorder = Recorder::own(self, frame)?;
         let recorded = record(&mut recorder);
         drop(recorder);
-        if recorded.is_err() {
-            frame.forget();
-        }
         let done = recorded.and_then(|()| frame.submit_and_wait());
-        frame.let_go(); // nothing of it runs any more, even if it has failed
-        done?;
+        frame.let_go(); // Nothing of it runs any more, or the device was given up and frees nothing.
+        if let Err(why) = done {
+            frame.forget();
+            return Err(why);
+        }
         frame.tell()?;
         frame.times()
     }

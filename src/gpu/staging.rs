@@ -17,19 +17,19 @@ impl Untyped {
         self.put(offset, bytes, Some(self.gpu.0.idle()))
     }
 
-    /// Writes the first bytes of a buffer that was just made: no work has it yet, so that there is none to wait for.
+    /// Writes bytes at an offset into a buffer that was just made: no work has it yet, so that there is none to wait for.
     ///
     /// # Errors
     /// Those of the device.
-    pub(super) fn write_new(&self, bytes: &[u8]) -> Result<()> {
-        self.put(0, bytes, None)
+    pub(super) fn write_new(&self, offset: usize, bytes: &[u8]) -> Result<()> {
+        self.put(offset, bytes, None)
     }
 
     fn put(&self, offset: usize, bytes: &[u8], idle: Option<RwLockWriteGuard<'_, ()>>) -> Result<()> {
         self.gpu.0.answers()?;
         let any = vk::MemoryPropertyFlags::empty();
         let copied = self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes));
-        drop(idle); // an upload is work itself
+        drop(idle); // An upload is a submission, which would wait for this lock for ever.
         match copied {
             Some(()) => Ok(()),
             None => upload(self, offset, bytes),

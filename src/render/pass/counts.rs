@@ -36,12 +36,13 @@ impl Counts {
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, pixels: u32, thread_items: u32) -> Result<Self> {
         let (n, of_blocks) = (pixels as usize, block_count(pixels, thread_items) as usize);
+        let offset = Buffer::new(gpu, "offset", n + 1, Location::Device)?;
+        offset.write_new(n, &[[0; 2]])?; // the number of all, which may be asked for before any is placed
         Ok(Self {
             priority: Buffer::new(gpu, "priority", n, Location::Device)?,
             weight: Buffer::new(gpu, "weight", n, Location::Device)?,
             count: Buffer::new(gpu, "count", n, Location::Device)?,
-            // The last is the number of all, which may be asked for before any is placed.
-            offset: Buffer::from_slice(gpu, "offset", &vec![[0; 2]; n + 1])?,
+            offset,
             state: Buffer::from_slice(gpu, "apportionment", &[Apportionment::default()])?,
             sums: Buffer::new(gpu, "sums", of_blocks, Location::Device)?,
             blocks: Buffer::new(gpu, "blocks", of_blocks, Location::Device)?,
