@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let missing = |Gap { seed, first, last }| format!("samples {first} to {last} of seed {seed} are missing");
     Warnings::new(true).insist(gaps.into_iter().map(missing));
-    if programs.len() > 1 {
+    if programs.len() > 1 && film.channel("direct.R").is_some() {
         let programs = Vec::from_iter(programs).join(" and ");
         complain(&format!("note: the parts are of {programs}: their layers direct and albedo may hold other light"));
     }

@@ -20,7 +20,7 @@ pub fn open(path: &Path) -> Result<File> {
     }
 }
 
-/// Reads a whole file that is no text, and so not empty.
+/// Reads a whole file of a kind that is never empty.
 ///
 /// # Errors
 /// As [`open`], and [`Error::Memory`].

@@ -32,7 +32,7 @@ fn an_image_is_told_why_it_is_black() {
     let folder = tempfile::tempdir().unwrap();
     let pillar = "[[mesh]]\nshape = 'sphere'\ntransform = { scale = 0.1, translate = [0, 0, -1] }\n";
     let (inside, beside) =
-        ("the camera sees one object alone, \"hall\", ", "no light comes from what the camera sees ");
+        ("the camera sees one object alone, \"hall\", ", "no sample found light on what the camera sees ");
     let away = SCENE
         .replace("position = [0, 0, 0]", "position = [0, 0, -9]")
         .replace("target = [0, 0, -1]", "target = [0, 0, -10]");
@@ -41,7 +41,7 @@ fn an_image_is_told_why_it_is_black() {
         (SCENE.to_owned() + pillar, "-o a.exr", beside),
         // It has no layer of objects.
         (SCENE.to_owned(), "-o a.png", beside),
-        (away, "-o a.exr", "the camera sees no surface"),
+        (away, "-o a.exr", "the camera sees neither "),
     ] {
         let said = warnings(&folder, &scene, words);
         assert!(said.len() == 1 && said[0].starts_with(&format!("the image is black: {why}")), "{words}: {said:?}");

@@ -81,7 +81,9 @@ pub fn make(
     check_room(args.filter(settings), settings, gpu)?;
     interrupt::leave_at_once("interrupted while the render was planned: nothing was rendered, and nothing written");
     let methods = args.denoise.map_or_else(|| fitting(gpu, settings, warnings), |method| vec![method]);
-    plan::plan(gpu, scene, settings, args.wanted(), &methods, target).map(Some)
+    let plan = plan::plan(gpu, scene, settings, args.wanted(), &methods, target)?;
+    interrupt::leave_at_once("interrupted: nothing was written");
+    Ok(Some(plan))
 }
 
 /// What a plan may choose among that names no filter, less what this film has no room for, which is said.
