@@ -101,7 +101,8 @@ const float ONE_SURFACE = 0.75;
 // The direct light of sample number `count`. One that passed over the key light counts as the mean of those before it, so that the mean has
 // no noise of that choice; or, if all before it did, as the first that does not. `unreflected` are channels that keep all of their light.
 vec3 direct_along(inout PixelLight l, vec3 direct, vec3 albedo, bvec3 unreflected, uint marks, uint count) {
-    if (!FX_SOFT) return direct;
+    bool may_have_key = FX_POINT || FX_SPOT || FX_DIRECTIONAL; // only lights without extent are such
+    if (!FX_SOFT || !may_have_key) return direct;
     bool passed_over = (marks & PASSED_OVER) != 0u, all_before = count == 1u || (l.remainder & ALL_PASSED_OVER) != 0u;
     if (all(unreflected)) l.remainder |= SOME_BARE;
     bool whole = count > 1u && (l.remainder & SOME_BARE) == 0u;

@@ -347,6 +347,7 @@ fn folded(gpu: &Gpu, samples: &[vec4], depth: u32, times: u32) -> (Vec<PixelStat
         many_samples: true,
         smooth_interface: true,
         soft_light: true,
+        point_lights: true,
         ..Effects::default()
     };
     let thread = gpu.tuning().thread();
