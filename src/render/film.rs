@@ -162,8 +162,8 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
     }
 }
 
-/// Only pixels with thousands of samples, that show glass, or some of them the sky or a lamp beside a key light, which others never chose,
-/// have remainders.
+/// Only pixels with thousands of samples, of glass, of a key light that no sample chose, and of the sky or a lamp beside a key light have
+/// remainders.
 fn drop_remainders_of_none(film: &mut Film) {
     let is_zero = |samples: &Samples| matches!(samples, Samples::U32(words) if words.iter().all(|&word| word == 0));
     film.channels.retain(|c| !(REMAINDERS.contains(&c.name.as_str()) && is_zero(&c.samples)));

@@ -21,8 +21,8 @@ struct Split {
     albedo: Vec3,
 }
 
-/// Parts the light of sample number `count`. w of `noted` holds its marks: see the kernel, which leaves [`SOME_BARE`] out where no light can be a
-/// key light.
+/// Parts the light of sample number `count`. w of `noted` holds its marks: see the kernel, which sets no [`SOME_BARE`] where no light
+/// can be a key light.
 fn split(l: &mut PixelLight, direct: Vec3, radiance: Vec3, noted: Vec4, count: u32) -> Split {
     let marks = noted.w as u32;
     let albedo = albedo_along(l, noted.truncate(), marks & ASTRAY != 0, count);

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// [`crate::error::Error::Usage`] and [`crate::error::Error::Output`].
 pub fn check(args: &Args) -> Result<()> {
     if !SceneFile::is_named(&args.scene) {
-        // The default output of an image would have its name.
+        // The error of opening it, before that of an output that has its name: an image's default output is the image itself.
         SceneFile::open(&args.scene)?;
     }
     let (images, checkpoint) = (args.output_files(), checkpoint::path(&args.output_files(), &args.scene));
