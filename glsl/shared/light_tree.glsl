@@ -112,8 +112,9 @@ uint choose_light(Receiver r, inout uint word, out float probability, inout KeyL
         }
         begin += words;
         uint beside = outside.child & ~LIGHT_LEAF;
-        if (FX_SOFT && FX_DIRECTIONAL && Light_kind(lights, beside) == LIGHT_DIRECTIONAL) consider(key, beside, float(words) * WORD);
+        if (FX_SOFT && !FX_WEIGHED_LIGHTS && is_directional(Light_kind(lights, beside))) consider(key, beside, float(words) * WORD);
     }
+    key.rival = 0.0; // they are chosen as often everywhere, so that none takes another's place elsewhere
     if (by_tree > 0.0 && place >= begin) {
         float digits = UNIT_STEP * unit_interval(hash); // below those of the word, in place of those that the choice uses up
         probability = begin > 0u ? float(0u - begin) * WORD : by_tree;

@@ -158,7 +158,7 @@ effects! {
     large_lamps: FX_LARGE_LAMPS;
     /// Lamps that shine from both sides.
     two_sided_lamps: FX_TWO_SIDED_LAMPS;
-    /// Up to 32 point and spot lights, one of which is chosen by what it would bring.
+    /// Several point, spot and directional lights, 32 at most, one of which is chosen by what it would bring.
     weighed_lights: FX_WEIGHED_LIGHTS;
     /// Several lights within the scene: one is chosen by a tree over them.
     light_tree: FX_LIGHT_TREE;

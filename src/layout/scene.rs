@@ -319,11 +319,6 @@ impl Light {
         matches!(self.effect(), Some(Effect::point_lights | Effect::spot_lights | Effect::directional_lights))
     }
 
-    /// Whether it shines from one point within the scene.
-    pub fn is_point_or_spot(&self) -> bool {
-        matches!(self.effect(), Some(Effect::point_lights | Effect::spot_lights))
-    }
-
     /// Whether it is infinitely far away.
     pub fn is_far(&self) -> bool {
         matches!(self.effect(), Some(Effect::directional_lights | Effect::environment))

@@ -87,7 +87,10 @@ impl Found {
         }
         let mapped = self.effects.environment && scene.environment.is_some();
         self.need(Effect::environment_map, mapped.then(|| "environment".into()));
-        self.need(Effect::weighed_lights, scene.weighed_lights.then(|| "several point or spot lights".into()));
+        self.need(
+            Effect::weighed_lights,
+            scene.weighed_lights.then(|| "several point, spot or directional lights".into()),
+        );
         self.need(Effect::light_tree, scene.has_light_tree().then(|| "several lamps".into()));
         let large = scene.large_lamps && scene.lights.iter().any(Light::is_triangle);
         let first = || scene.lights.iter().position(|l| lights::is_large(scene, l));

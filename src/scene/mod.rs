@@ -98,8 +98,8 @@ pub struct Scene {
     /// animation moves the scene. It stays as the scene was loaded, so that no frame depends on those before it. An engine whose lamps grow
     /// sets it before it makes a renderer; without, the light is the same on average, with more noise near them.
     pub large_lamps: bool,
-    /// Whether one of the point and spot lights is chosen by what each would bring to the point that is lit, as where there are from two,
-    /// be they dark now, to 32 that shine. It stays as the scene was loaded, too.
+    /// Whether one of the point, spot and directional lights is chosen by what each would bring to the point that is lit, as where there
+    /// are from two, be they dark now, to 32 that shine. It stays as the scene was loaded, too.
     pub weighed_lights: bool,
     /// Nodes of the tree by which lamps are chosen where there are several, see `scene/build/light_tree.rs`; else empty, and that stays, too.
     pub light_nodes: Vec<LightNode>,

@@ -238,10 +238,11 @@ fn sample_sphere_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightS
     }
 }
 
-/// What a point or spot light brings to a receiver from which it is seen, up to a factor that all have.
+/// What a delta light brings to a receiver from which it is seen, up to a factor that all have.
 fn unshadowed(light: &Light, r: &Receiver) -> f32 {
-    let to_light = Vec3::from(light.a) - r.position;
-    let d2 = to_light.dot(to_light).max(1e-30);
+    let is_sun = light.kind == LIGHT_DIRECTIONAL;
+    let to_light = if is_sun { -Vec3::from(light.b) } else { Vec3::from(light.a) - r.position };
+    let d2 = if is_sun { 1.0 } else { to_light.dot(to_light).max(1e-30) };
     let w = to_light / d2.sqrt();
     let cosine = r.normal.dot(w);
     let cosine = if r.lets_light_through { cosine.abs() } else { cosine };
@@ -251,36 +252,31 @@ fn unshadowed(light: &Light, r: &Receiver) -> f32 {
     if cosine > 0.0 || r.lets_light_through { brings } else { 0.0 }
 }
 
-/// Chooses anew among the point and spot lights, which lie before those with a surface: by what each would bring if nothing were in
-/// its way.
-fn choose_by_share(scene: &Scene, r: &Receiver, u: f32, key: &mut KeyLight) -> (Light, u32) {
+/// Chooses anew among the delta lights, which lie before those with a surface: by what each would bring if nothing were in its way. Lamps as
+/// a whole, and lights at infinity as a whole, count by that to the power of 3/4. Returns the light, its index and the key light.
+fn choose_by_share(scene: &Scene, r: &Receiver, u: f32) -> (Light, u32, KeyLight) {
     let before_surfaces = (0..).zip(&scene.lights).take_while(|(_, light)| !light.has_surface());
-    let group: Vec<_> =
-        before_surfaces.filter(|(_, light)| light.is_point_or_spot()).map(|(i, l)| (i, l, unshadowed(l, r))).collect();
-    let probability: f32 = group.iter().map(|(_, light, _)| light.probability).sum();
-    let lit = || group.iter().filter(|(.., brings)| *brings > 0.0);
-    let (sum, number) = (lit().map(|(.., brings)| brings).sum::<f32>(), lit().count() as f32);
-    let mut likely: Vec<_> = lit().map(|&(i, _, brings)| (probability * mixed(brings / sum, number), i)).collect();
-    likely.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-    if probability > key.probability {
-        let (likeliest, index) = likely.first().copied().unwrap_or((0.0, NONE));
-        *key = KeyLight { index, probability: likeliest, rival: likely.get(1).map_or(0.0, |(next, _)| *next) };
-    }
-    let (mut before, mut chosen) = (0.0, (Light { probability, value: [0.0; 3], ..scene.lights[0] }, NONE));
+    let all: Vec<_> =
+        before_surfaces.filter(|(_, light)| light.is_delta()).map(|(i, l)| (i, l, unshadowed(l, r))).collect();
+    let group: f32 = all.iter().map(|(_, light, _)| light.probability).sum();
+    let lit = || all.iter().filter(|(.., brings)| *brings > 0.0);
+    let number = lit().count() as f32;
+    let of_kind = |far: bool| lit().filter(|(_, l, _)| l.is_far() == far).map(|(.., brings)| brings).sum::<f32>();
+    let sums = [of_kind(false), of_kind(true)];
+    let kinds = sums.map(|sum| sum.sqrt() * sum.sqrt().sqrt());
+    let (mut before, mut key) = (0.0, KeyLight::NONE);
+    let mut chosen = (Light { probability: group, value: [0.0; 3], ..scene.lights[0] }, NONE);
     for &(index, light, brings) in lit() {
-        let share = mixed(brings / sum, number);
-        chosen = (Light { probability: probability * share, ..*light }, index);
-        before += share;
-        if u < before {
-            break;
+        let kind = usize::from(light.is_far());
+        let odds = kinds[kind] / (kinds[0] + kinds[1]) * (brings / sums[kind]);
+        let share = odds * (1.0 - EVEN_SHARE) + 1.0 / number * EVEN_SHARE;
+        key.consider(index, group * share);
+        if u >= before {
+            chosen = (Light { probability: group * share, ..*light }, index);
         }
+        before += share;
     }
-    chosen
-}
-
-/// The share of the choices that a light has by what it brings, or alike with all of `number`.
-fn mixed(share: f32, number: f32) -> f32 {
-    share * (1.0 - EVEN_SHARE) + 1.0 / number * EVEN_SHARE
+    (chosen.0, chosen.1, key)
 }
 
 fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
@@ -301,15 +297,13 @@ fn lamp_density(scene: &Scene, material: u32, brightness: f32) -> f32 {
     if scene.has_light_tree() && brightness > 0.0 { density * brightness } else { density }
 }
 
-/// The key light among those that the table alone chooses.
+/// The key light where the table alone chooses.
 fn key_of_table(scene: &Scene) -> KeyLight {
     let mut key = KeyLight::NONE;
-    for (index, light) in (0..).zip(&scene.lights).take_while(|(_, light)| !light.has_surface()) {
-        if light.kind == LIGHT_DIRECTIONAL || !scene.weighed_lights && light.is_point_or_spot() {
-            key.consider(index, light.probability);
-        }
+    for (index, light) in (0..).zip(&scene.lights).filter(|(_, light)| light.is_delta()) {
+        key.consider(index, light.probability);
     }
-    key
+    KeyLight { rival: 0.0, ..key } // none takes its place elsewhere
 }
 
 /// One light for a receiver. Radiance is 0 when the light cannot reach the point.
@@ -328,9 +322,10 @@ pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSam
         light.probability = probability;
     }
     if scene.weighed_lights {
-        let weighed = choose_by_share(scene, r, u.x, &mut key);
-        if light.is_point_or_spot() {
-            (light, index) = weighed;
+        let weighed = choose_by_share(scene, r, u.x);
+        key = weighed.2;
+        if light.is_delta() {
+            (light, index) = (weighed.0, weighed.1);
         }
     }
     let mut sample = match light.kind {

@@ -59,7 +59,7 @@ pub struct KeyLight {
     pub index: u32,
     /// Probability of the choice.
     pub probability: f32,
-    /// That of the likeliest other light that may be the key light elsewhere; 0 without one.
+    /// That of the likeliest other light without extent; 0 without one.
     pub rival: f32,
 }
 
@@ -67,10 +67,12 @@ impl KeyLight {
     /// That of a point none of whose lights has been considered.
     pub const NONE: Self = Self { index: NONE, probability: 0.0, rival: 0.0 };
 
-    /// Takes a light without extent, chosen as often everywhere, for it, if it is chosen more often than those before.
+    /// Takes a light without extent for it, if it is chosen more often than those before; else it may be their rival.
     pub fn consider(&mut self, index: u32, probability: f32) {
         if probability > self.probability {
-            *self = Self { index, probability, rival: 0.0 };
+            *self = Self { index, probability, rival: self.probability };
+        } else {
+            self.rival = self.rival.max(probability);
         }
     }
 
@@ -184,10 +186,11 @@ pub fn choose_light(scene: &Scene, r: &Receiver, word: u32) -> Choice {
         }
         begin += words;
         let beside = outside.child & !LIGHT_LEAF;
-        if scene.lights[beside as usize].kind == LIGHT_DIRECTIONAL {
+        if !scene.weighed_lights && scene.lights[beside as usize].kind == LIGHT_DIRECTIONAL {
             chosen.key.consider(beside, words as f32 * WORD);
         }
     }
+    chosen.key.rival = 0.0; // they are chosen as often everywhere, so that none takes another's place elsewhere
     if root.power > 0.0 && place >= begin {
         let u = unit_interval(word) + UNIT_STEP * unit_interval(hash);
         let by_tree = if begin > 0 { begin.wrapping_neg() as f32 * WORD } else { root.power };

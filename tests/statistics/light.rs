@@ -5,14 +5,15 @@ use crate::twin::{Random, Workplace, many_lamps, many_lamps_and};
 use glam::{Mat3, Vec3, dvec3, vec3};
 use std::f64::consts::{PI, TAU};
 use tallow::layout::{
-    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_LEAF, LIGHT_POINT, Light, MATERIAL_EMITS_BEHIND, NONE,
+    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_LEAF, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_EMITS_BEHIND, NONE,
 };
 use tallow::math::hash::{pcg, unit_interval};
+use tallow::math::srgb::luminance;
 use tallow::scene::Loaded;
 use tallow::shaders::shared::light::{EVEN_SHARE, KEY_PROBABILITY};
 use tallow::shaders::shared::light_tree::CHILDREN;
 use tallow::twins::light::*;
-use tallow::twins::light_tree::{Choice, brought_by, choose_by_tree, choose_light};
+use tallow::twins::light_tree::{Choice, brought_by, choose_by_tree, choose_light, spot_share};
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 use tallow::twins::scene::triangle_vertices;
 use tallow::twins::surface::{Surface, surface_at, surface_emission};
@@ -143,20 +144,31 @@ fn many_lights() -> Loaded {
     scene
 }
 
+/// Lights of a kind, all at one place or from one direction.
+fn lights(kind: &str, intensity: u32, count: usize) -> String {
+    let (place, power) = match kind {
+        "directional" => ("direction = [0.0, -1.0, 0.0]", "irradiance"),
+        "spot" => ("position = [0.0, 1.0, 0.0]\ndirection = [0.0, -1.0, 0.0]", "intensity"),
+        _ => ("position = [0.0, 1.0, 0.0]", "intensity"),
+    };
+    format!("[[light]]\ntype = '{kind}'\n{place}\n{power} = {intensity}\n").repeat(count)
+}
+
 #[test]
 fn lights_that_are_dark_count_for_nothing() {
-    let with = |kind: &str, lit: usize, dark: usize| {
-        let aim = if kind == "spot" { "direction = [0.0, -1.0, 0.0]\n" } else { "" };
-        let light = |intensity| {
-            format!("[[light]]\ntype = '{kind}'\nposition = [0.0, 1.0, 0.0]\nintensity = {intensity}\n{aim}")
-        };
-        let scene = Workplace::new().scene(&(light(1).repeat(lit) + &light(0).repeat(dark)));
+    let of = |text: &str| {
+        let scene = Workplace::new().scene(text);
         (scene.weighed_lights, scene.has_light_tree())
     };
-    let (several, many) = ((true, false), (false, true));
-    for kind in ["spot", "point"] {
-        let found = [(1, 0), (1, 1), (32, 0), (32, 5), (33, 0), (33, 5)].map(|(lit, dark)| with(kind, lit, dark));
-        assert_eq!(found, [(false, false), several, several, several, many, many], "{kind}");
+    let (one, several, many) = ((false, false), (true, false), (false, true));
+    for (kind, of_many) in [("spot", many), ("point", many), ("directional", one)] {
+        let found = [(1, 0), (1, 1), (32, 0), (32, 5), (33, 0), (33, 5)]
+            .map(|(lit, dark)| of(&(lights(kind, 1, lit) + &lights(kind, 0, dark))));
+        assert_eq!(found, [one, several, several, several, of_many, of_many], "{kind}");
+    }
+    for (points, suns, expected) in [(1, 1, several), (31, 1, several), (31, 2, many)] {
+        let found = of(&(lights("point", 1, points) + &lights("directional", 1, suns)));
+        assert_eq!(found, expected, "{points} points, {suns} suns");
     }
 }
 
@@ -293,22 +305,86 @@ fn a_tree_draws_lights_with_their_probabilities() {
     }
 }
 
+/// A sky, two suns, a bulb and a spot.
+fn sky_suns_and_lamps() -> Loaded {
+    Workplace::new().scene(
+        "[environment]\nradiance = 0.3\n\
+         [[light]]\ntype = 'directional'\ndirection = [0.5, -1.0, 0.2]\nirradiance = 2.0\n\
+         [[light]]\ntype = 'directional'\ndirection = [-0.9, -0.4, 0.2]\nirradiance = [0.1, 0.5, 3.0]\n\
+         [[light]]\ntype = 'point'\nposition = [0.3, 0.9, 0.1]\nintensity = 0.4\n\
+         [[light]]\ntype = 'spot'\nposition = [0.5, 2.0, 0.0]\ndirection = [0.0, -1.0, 0.0]\ncutoff = 40.0\nintensity = 3.0\n",
+    )
+}
+
+/// Probabilities of the lights without extent, where they are weighed: by what each brings, lamps as a whole and suns as a whole by that to
+/// the power of 3/4, and a part of the choices evenly.
+fn by_place(scene: &Loaded, r: &Receiver) -> Vec<f64> {
+    let brings = |light: &Light| {
+        let (w, d2) = match light.kind {
+            LIGHT_DIRECTIONAL => (-Vec3::from(light.b), 1.0),
+            _ => {
+                let way = Vec3::from(light.a) - r.position;
+                (way.normalize(), f64::from(way.length_squared()))
+            }
+        };
+        let facing = if r.lets_light_through { r.normal.dot(w).abs() } else { r.normal.dot(w) };
+        let beam = if light.kind == LIGHT_SPOT { spot_share(light, w) } else { 1.0 };
+        let reflects = facing + r.odds_beyond_cosine + r.odds_of_lobe(w, 0.0);
+        let lit = light.is_delta() && (facing > 0.0 || r.lets_light_through);
+        if lit { f64::from(beam * reflects * luminance(light.value)) / d2 } else { 0.0 }
+    };
+    let brought: Vec<f64> = scene.lights.iter().map(brings).collect();
+    let far: Vec<bool> = scene.lights.iter().map(Light::is_far).collect();
+    let sum = |kind: bool| brought.iter().zip(&far).filter(|(_, far)| **far == kind).map(|(b, _)| b).sum::<f64>();
+    let sums = [false, true].map(sum);
+    let (kinds, number) = (sums.map(|sum| sum.powf(0.75)), brought.iter().filter(|b| **b > 0.0).count() as f64);
+    let group: f64 = scene.lights.iter().filter(|l| l.is_delta()).map(|l| f64::from(l.probability)).sum();
+    let share = |(&b, &far): (&f64, &bool)| {
+        let odds =
+            if b > 0.0 { b / sums[usize::from(far)] * kinds[usize::from(far)] / (kinds[0] + kinds[1]) } else { 0.0 };
+        let even = if b > 0.0 { 1.0 / number } else { 0.0 };
+        group * (f64::from(EVEN_SHARE) * even + f64::from(1.0 - EVEN_SHARE) * odds)
+    };
+    brought.iter().zip(&far).map(share).collect()
+}
+
+#[test]
+fn suns_and_lamps_are_chosen_by_what_they_bring() {
+    const COUNT: u32 = 1 << 16;
+    let scene = sky_suns_and_lamps();
+    assert!(scene.weighed_lights && !scene.has_light_tree() && scene.lights.len() == 5);
+    for r in receivers() {
+        let expected = by_place(&scene, &r);
+        let mut observed = vec![0.0; scene.lights.len()];
+        for i in 0..COUNT {
+            let s = sampler_start(0, i, 1, true);
+            let light = light_sample(&scene, &r, sample_2d_bits(s, 0)[0], sample_2d(s, 1));
+            observed[light.chosen as usize] += 1.0;
+            let claimed = if light.pdf > 0.0 { 0.0 } else { f64::from(light.sharp) };
+            let sky = scene.lights[light.chosen as usize].kind == LIGHT_ENVIRONMENT;
+            assert!(sky || (claimed / expected[light.chosen as usize] - 1.0).abs() < 1e-4, "{light:?}: {expected:?}");
+        }
+        let (deltas, sky) = (0..5).partition::<Vec<usize>, _>(|&i| scene.lights[i].is_delta());
+        let mut expected: Vec<f64> = deltas.iter().map(|&i| expected[i] * f64::from(COUNT)).collect();
+        let observed: Vec<f64> = deltas.iter().chain(&sky).map(|&i| observed[i]).collect();
+        expected.push(f64::from(COUNT) - expected.iter().sum::<f64>());
+        let p = chi_square(&observed, &expected);
+        assert!(p > sidak(4), "{r:?}: {p:.1e}, {observed:?} of {expected:?}");
+        let planted: Vec<f64> = observed.iter().zip(0..).map(|(o, i)| o * (0.97 + 0.06 * f64::from(i % 2))).collect();
+        assert!(chi_square(&planted, &expected) < sidak(4), "the test cannot see a choice that is 3 % off");
+    }
+}
+
 /// The key light and the share that is kept of it, by how often each light was chosen.
 fn expected_key(scene: &Loaded, chosen: &[f32]) -> (u32, f32) {
-    let weighed = |i: &usize| scene.weighed_lights && scene.lights[*i].is_point_or_spot();
-    // Of lights that are as likely everywhere; the likeliest light of a tree is not known to those that go another way down.
-    let steady = |i: &usize| match scene.has_light_tree() {
-        true => scene.lights[*i].kind == LIGHT_DIRECTIONAL,
-        false => scene.lights[*i].is_delta() && !weighed(i),
-    };
-    let all = || 0..chosen.len();
-    let all_weighed: f32 = all().filter(weighed).map(|i| chosen[i]).sum();
-    let by_place = all_weighed > all().filter(steady).map(|i| chosen[i]).fold(0.0, f32::max);
-    let mut likely: Vec<_> = all().filter(|i| if by_place { weighed(i) } else { steady(i) }).collect();
+    // The likeliest light of a tree is not known to those that go another way down.
+    let told = |light: &Light| scene.weighed_lights || !scene.has_light_tree() || light.kind == LIGHT_DIRECTIONAL;
+    let considered = |i: &usize| scene.lights[*i].is_delta() && told(&scene.lights[*i]);
+    let mut likely: Vec<_> = (0..chosen.len()).filter(considered).collect();
     likely.sort_by(|&a, &b| chosen[b].total_cmp(&chosen[a]));
-    let rival = if by_place && likely.len() > 1 { chosen[likely[1]] } else { 0.0 };
-    match likely.first() {
-        Some(&key) if chosen[key] > KEY_PROBABILITY => {
+    match likely[..] {
+        [key, ..] if chosen[key] > KEY_PROBABILITY => {
+            let rival = likely.get(1).filter(|_| scene.weighed_lights).map_or(0.0, |&i| chosen[i]);
             let often = (chosen[key] / KEY_PROBABILITY - 1.0).min(1.0);
             (key as u32, often * (1.0 - (rival / chosen[key]).powi(2)))
         }
@@ -316,8 +392,8 @@ fn expected_key(scene: &Loaded, chosen: &[f32]) -> (u32, f32) {
     }
 }
 
-/// The key light of a place is the same however the choice falls, and the light without extent that it falls on most often, of those that
-/// are weighed or of those that are as likely everywhere; of one that others rival less is kept.
+/// The key light of a place is the same however the choice falls, and the light without extent that it falls on most often; of one that
+/// others rival less is kept, but where lights are chosen as often everywhere.
 #[test]
 fn the_key_light_is_the_one_that_is_chosen_most_often() {
     let bulb = "[[light]]\ntype = 'point'\nposition = [0.3, 0.9, 0.1]\nintensity = 1.0\n";
@@ -326,7 +402,6 @@ fn the_key_light_is_the_one_that_is_chosen_most_often() {
     };
     let sky = "[environment]\nradiance = 0.1\n";
     let alone = Workplace::new().scene(&format!("{sky}{bulb}{}", sun(0.2)));
-    // The sun is chosen less often than the bulbs together, and more often than each of them.
     let few = Workplace::new().scene(&format!("{bulb}{}{}", bulb.replace("0.3", "-0.4"), sun(6.0)));
     let (mut of_kinds, mut without, mut rivalled) = ([0; 8], 0, 0);
     for scene in [
@@ -335,6 +410,7 @@ fn the_key_light_is_the_one_that_is_chosen_most_often() {
         many_lamps_and(3, bulb),
         many_lamps_and(3, &sun(4.0)),
         many_lamps_and(40, &sun(4.0)),
+        many_lamps_and(40, &[sun(4.0), sun(3.0).replace("0.5", "-0.5")].concat()),
         alone,
         few,
     ] {

@@ -37,8 +37,8 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     list(scene)?;
     scene.large_lamps = scene.lights.iter().any(|l| is_large(scene, l));
     // Dark ones may light up later.
-    let points = |lights: &[Light]| lights.iter().filter(|l| l.is_point_or_spot()).count();
-    scene.weighed_lights = points(&scene.rig.lights) > 1 && points(&scene.lights) <= MOST_WEIGHED;
+    let deltas = |lights: &[Light]| lights.iter().filter(|l| l.is_delta()).count();
+    scene.weighed_lights = deltas(&scene.rig.lights) > 1 && deltas(&scene.lights) <= MOST_WEIGHED;
     if scene.lights.iter().filter(|l| is_in_tree(scene, l)).count() > MOST_BY_POWER {
         tell_brightness(scene);
         scene.light_nodes = tree(scene);
@@ -275,14 +275,14 @@ pub fn is_large(scene: &Scene, light: &Light) -> bool {
 
 /// Whether a light of a scene that has a tree of them lies in it.
 fn is_in_tree(scene: &Scene, light: &Light) -> bool {
-    !(light.is_far() || scene.weighed_lights && light.is_point_or_spot())
+    !(light.is_far() || scene.weighed_lights && light.is_delta())
 }
 
 fn is_two_sided(scene: &Scene, light: &Light) -> bool {
     scene.materials.get(light.material as usize).is_some_and(|m| m.flags & MATERIAL_EMITS_BEHIND != 0)
 }
 
-/// How many point and spot lights are weighed at every point at most: it takes time in proportion to their number. A tree leaves 1.1 times the
+/// How many delta lights are weighed at every point at most: it takes time in proportion to their number. A tree leaves 1.1 times the
 /// relMSE of six and of twenty points, and 1.1 to 2.7 times that of as many spots, since large nodes do not know their beams.
 const MOST_WEIGHED: usize = 32;
 
