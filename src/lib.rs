@@ -43,6 +43,7 @@ mod machine;
 #[doc(hidden)] // an engine needs no kernel's mathematics; tests and benches do
 pub mod math;
 mod memory;
+mod own_json;
 pub mod plan;
 pub mod profile;
 pub mod render;

@@ -20,6 +20,7 @@ use crate::allocate::Placing;
 use crate::denoise::filter::{self, Method};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::own_json::OwnJson;
 use crate::render::Outputs;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -220,16 +221,13 @@ impl Plan {
     /// # Errors
     /// [`Error::Usage`] with one line for what is no plan, for one of another version, and for one whose settings are not what was chosen.
     pub fn parse(text: &str) -> Result<Self> {
-        #[derive(Deserialize)]
-        struct Header {
-            version: u32,
-        }
-        let no_plan = |e: serde_json::Error| Error::Usage(format!("is no plan of tallow: {e}"));
-        let Header { version } = serde_json::from_str(text).map_err(no_plan)?;
-        if version != VERSION {
-            return Err(Error::Usage(format!("is a plan of version {version}, this program knows version {VERSION}")));
-        }
-        let plan: Self = serde_json::from_str(text).map_err(no_plan)?;
+        let kind = OwnJson {
+            what: "plan, which tallow render --plan writes with --time or --error",
+            version: "version",
+            versions: VERSION.into()..=VERSION.into(),
+            remedy: "plan again, or use the tallow that wrote it",
+        };
+        let plan: Self = kind.parse(text.as_bytes()).map_err(Error::Usage)?;
         plan.target.check()?;
         plan.settings.validate()?;
         plan.method()?;

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Pass, PassTime, total_ms};
 use crate::image::input::{self, BYTES_OF_JSON};
 use crate::machine;
+use crate::own_json::OwnJson;
 use crate::render::settings::Settings;
 use crate::render::{Counters, traces_paths};
 use crate::scene::Scene;
@@ -209,25 +210,15 @@ impl Profile {
     /// Reads what `tallow profile --json` printed.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that cannot be read, is no profile, or is one of a newer version.
+    /// [`Error::Input`] for a file that cannot be read, is no profile, or is one of another version.
     pub fn read(path: &Path) -> Result<Self> {
-        #[derive(Deserialize)]
-        struct Version {
-            schema: u32,
-        }
-        let text = input::read_text(path, BYTES_OF_JSON)?;
-        let refused = |e: serde_json::Error| {
-            Error::input(path, format!("is no profile, which tallow profile --json prints: {e}"))
+        let kind = OwnJson {
+            what: "profile, which tallow profile --json prints",
+            version: "schema",
+            versions: SCHEMA.into()..=SCHEMA.into(),
+            remedy: "profile again, or use the tallow that wrote it",
         };
-        let Version { schema } = serde_json::from_slice(&text).map_err(refused)?;
-        if schema != SCHEMA {
-            let remedy = "profile again, or use the tallow that wrote it";
-            return Err(Error::input(
-                path,
-                format!("is a profile of version {schema}, this tallow reads {SCHEMA}: {remedy}"),
-            ));
-        }
-        serde_json::from_slice(&text).map_err(refused)
+        kind.parse(&input::read_text(path, BYTES_OF_JSON)?).map_err(|what| Error::input(path, what))
     }
 }
 

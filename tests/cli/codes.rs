@@ -119,11 +119,7 @@ fn files_in_the_place_of_others_are_told_by_what_they_are() {
     let run = |words: &str| tallow(&folder, &words.split(' ').collect::<Vec<_>>());
     // Its default output would replace it.
     complains(&run("render a.exr"), 3, &["error: a.exr: is no scene: \"exr\" is none of toml, obj"]);
-    complains(
-        &run("profile s.toml --compare a.exr"),
-        3,
-        &["a.exr: is no profile, which tallow profile --json prints: "],
-    );
+    complains(&run("profile s.toml --compare a.exr"), 3, &["a.exr: is no profile, which tallow profile --json prints"]);
     complains(
         &run("sequence s.toml -o a.gif"),
         2,

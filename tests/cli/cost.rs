@@ -371,8 +371,17 @@ fn what_cannot_be_measured_is_one_line() {
     std::fs::create_dir(folder.path().join("newer")).unwrap();
     let newer = folder.path().join("newer/cost.json");
     std::fs::write(&newer, "{\"schema\": 99}").unwrap();
-    complains(&cost(&folder, "-o newer"), 3, &["newer/cost.json: is of a newer version (schema 99, this one knows 1)"]);
+    let version =
+        "newer/cost.json: is of version 99, where this program knows version 1: remove it to measure anew, or";
+    complains(&cost(&folder, "-o newer"), 3, &[version]);
     assert_eq!(std::fs::read(&newer).unwrap(), b"{\"schema\": 99}");
+    // As a full disk leaves it.
+    std::fs::write(&newer, "").unwrap();
+    complains(
+        &cost(&folder, "-o newer"),
+        3,
+        &["newer/cost.json: is empty, and no result of tallow cost: remove it to"],
+    );
     let words = format!("render {} --width 24 --height 20 --quiet --spp 1 -o other.exr", scene());
     assert!(within(&folder, &words).status().unwrap().success());
     complains(&cost(&folder, "--reference other.exr"), 3, &["other.exr: is 24x20, but 24x24 is measured"]);

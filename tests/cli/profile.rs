@@ -180,10 +180,14 @@ fn bad_profiles_and_options_are_one_line() {
     std::fs::write(folder.path().join("newer.json"), "{\"schema\": 2, \"what\": []}").unwrap();
     std::fs::write(folder.path().join("list.json"), "[1, 2]").unwrap();
     std::fs::write(folder.path().join("empty.json"), "{\"schema\": 1}").unwrap();
-    complains(&run(&["half.json"]), 3, &["half.json", "no profile, which tallow profile --json prints"]);
-    complains(&run(&[BOX, "--compare", "newer.json"]), 3, &["newer.json", "version 2", "reads 1"]);
-    complains(&run(&[BOX, "--compare", "list.json"]), 3, &["list.json", "no profile"]);
-    complains(&run(&["empty.json"]), 3, &["empty.json", "missing field"]);
+    complains(&run(&["half.json"]), 3, &["half.json: ends before it is complete: profile again"]);
+    complains(&run(&[BOX, "--compare", "newer.json"]), 3, &["newer.json: is of version 2", "knows version 1: profile"]);
+    complains(
+        &run(&[BOX, "--compare", "list.json"]),
+        3,
+        &["list.json: is no profile, which tallow profile --json prints"],
+    );
+    complains(&run(&["empty.json"]), 3, &["empty.json: is damaged: missing field"]);
     complains(&run(&["missing.json"]), 3, &["missing.json", "No such file"]);
     complains(&run(&[BOX, "--compare", "missing.json"]), 3, &["missing.json", "No such file"]);
     complains(&run(&["missing.toml"]), 3, &["missing.toml"]);

@@ -6,9 +6,10 @@ use crate::cost::document::{Document, Point, SCHEMA};
 use crate::cost::words::{factor, milliseconds, number};
 use crate::cost::{Images, table};
 use crate::error::{Error, Result};
-use crate::image::{input, output};
+use crate::image::input::{self, BYTES_OF_JSON};
+use crate::image::output;
+use crate::own_json::OwnJson;
 use crate::report::{html, table as text_table};
-use serde_json::Value;
 use std::cell::RefCell;
 use std::ffi::OsStr;
 use std::io::ErrorKind;
@@ -182,18 +183,13 @@ fn json(document: &Document) -> Vec<u8> {
 
 /// Reads a document, of this version or an older one.
 fn read(file: &Path) -> Result<Document> {
-    let value: Value = serde_json::from_slice(&input::read(file)?).map_err(|e| not_ours(file, &e))?;
-    let schema = value.get("schema").and_then(Value::as_u64).unwrap_or(0);
-    if schema > SCHEMA.into() {
-        let what =
-            format!("is of a newer version (schema {schema}, this one knows {SCHEMA}): take another folder with -o");
-        return Err(Error::input(file, what));
-    }
-    serde_json::from_value(value).map_err(|e| not_ours(file, &e))
-}
-
-fn not_ours(file: &Path, e: &serde_json::Error) -> Error {
-    Error::input(file, format!("is no result of tallow cost: {e}; take another folder with -o"))
+    let kind = OwnJson {
+        what: "result of tallow cost",
+        version: "schema",
+        versions: 1..=SCHEMA.into(),
+        remedy: "remove it to measure anew, or take another folder with -o",
+    };
+    kind.parse(&input::read_text(file, BYTES_OF_JSON)?).map_err(|what| Error::input(file, what))
 }
 
 /// A table of the points, the findings, and where the results are.
