@@ -1,4 +1,5 @@
 //! What is said of a mistake in a scene file, in words that need no knowledge of the parser.
+use super::unknown::{LISTS, unknown};
 
 /// The parser's `message` about what is at byte `at` of `text`, in one line that says what is expected there.
 pub(super) fn explain(text: &str, at: usize, message: &str) -> String {
@@ -7,22 +8,6 @@ pub(super) fn explain(text: &str, at: usize, message: &str) -> String {
         .or_else(|| unknown(message))
         .or_else(|| syntax(text, at, message))
         .unwrap_or_else(|| message.replace('\n', " "))
-}
-
-/// "unknown field `widht`, expected one of `width`, `height`" becomes one line with the nearest name first.
-fn unknown(message: &str) -> Option<String> {
-    let kind = match message {
-        m if m.starts_with("unknown field") => "key",
-        m if m.starts_with("unknown variant") => "value",
-        _ => return None,
-    };
-    // The word itself may have such quotes.
-    let (unknown, known) = message.rsplit_once("`, expected").unwrap_or_else(|| (message.trim_end_matches('`'), ""));
-    let unknown = unknown.split_once('`').map_or("", |(_, word)| word);
-    let known: Vec<_> = known.split('`').skip(1).step_by(2).collect();
-    let hint = hint(unknown, &known).map_or_else(|| ".".to_owned(), |hint| format!(": {hint}"));
-    let known = if known.is_empty() { String::new() } else { format!(" Known: {}", known.join(", ")) };
-    Some(format!("unknown {kind} \"{unknown}\"{hint}{known}"))
 }
 
 /// A header with one pair of brackets in place of two, or the other way.
@@ -40,9 +25,6 @@ fn wrong_table(text: &str, at: usize, message: &str) -> Option<String> {
 fn of_several(name: &str) -> String {
     format!("there may be several of {name}: write [[{name}]]")
 }
-
-/// Tables of which there may be several.
-const LISTS: [&str; 6] = ["mesh", "instance", "material", "light", "animation", "animation.keys"];
 
 /// The name of the table whose header begins at byte `at`, and whether that is one of several.
 fn header(text: &str, at: usize) -> Option<(&str, bool)> {
@@ -194,61 +176,6 @@ fn word(text: &str, at: usize) -> String {
     format!("{key} takes a text in quotes{example}")
 }
 
-/// What a word stands for that is not among the known ones: what other renderers call so, or the known one most like it.
-fn hint(unknown: &str, known: &[&str]) -> Option<String> {
-    let of = |value| known.contains(&value);
-    match unknown {
-        "area" | "rect" | "quad" | "disk" if of("directional") => {
-            return Some("what shines from an area is a mesh whose material has an emission.".to_owned());
-        }
-        "infinite" | "envmap" | "sky" | "dome" if of("directional") => {
-            return Some("what shines from all around is the table [environment].".to_owned());
-        }
-        "color" | "power" | "energy" | "strength" if of("irradiance") => {
-            return Some("a light has an intensity, or an irradiance where it is directional.".to_owned());
-        }
-        _ => {}
-    }
-    let elsewhere = ELSEWHERE.iter().find(|(here, words)| of(here) && words.contains(&unknown));
-    let word = elsewhere.map_or(unknown, |(here, _)| here);
-    let near = nearest(word, known.iter().copied())?;
-    (strsim::jaro_winkler(word, near) >= LEAST_LIKENESS).then(|| format!("did you mean \"{near}\"?"))
-}
-
-/// Keys and values, and what other programs call them; of several that are known where the word stands the first counts.
-const ELSEWHERE: [(&str, &[&str]); 21] = [
-    ("directional", &["sun", "distant"]),
-    ("diffuse", &["matte", "lambertian"]),
-    ("conductor", &["metal"]),
-    ("dielectric", &["glass"]),
-    ("coated", &["plastic"]),
-    ("metallic-roughness", &["pbr", "principled", "disney"]),
-    ("cube", &["box"]),
-    ("rectangle", &["plane", "quad", "square"]),
-    ("transform", &["position", "translate", "rotate", "scale", "matrix"]),
-    ("translate", &["position"]),
-    ("shape", &["type"]),
-    ("file", &["path", "image"]),
-    ("target", &["look_at", "lookat"]),
-    ("lens_radius", &["aperture"]),
-    ("color", &["base_color", "albedo", "diffuse", "reflectance"]),
-    ("color_texture", &["texture"]),
-    ("radiance", &["color", "intensity", "strength"]),
-    ("environment", &["sky", "world", "background"]),
-    ("width", &["resolution", "size"]),
-    ("spp", &["samples", "samples_per_pixel", "sample_count"]),
-    ("max_depth", &["depth", "bounces", "max_bounces"]),
-];
-
-/// Words that are less alike, from 0 to 1, are not taken for one another: "sun" and "render" have .5.
-const LEAST_LIKENESS: f64 = 0.7;
-
-/// The name that is most like `word`.
-pub(in crate::scene) fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let like = |name: &str| (strsim::jaro_winkler(word, name) * 1e6) as u32;
-    names.max_by_key(|name| like(name))
-}
-
 #[cfg(test)]
 mod tests {
     use crate::scene::description::parse;
@@ -395,28 +322,6 @@ mod tests {
             );
         }
         assert!(parse(Path::new("s.toml"), r"mesh = [{ file = 'C:\dir\b.obj' }]").is_ok(), "control");
-    }
-
-    /// By their letters "samples" was "sampler", and "base_color" "specular".
-    #[test]
-    fn words_of_other_programs_are_answered_by_those_of_this_one() {
-        for (text, here) in [
-            ("[render]\nsamples = 4", "spp"),
-            ("[render]\nsamples_per_pixel = 4", "spp"),
-            ("[render]\nmax_bounces = 4", "max_depth"),
-            ("[film]\nresolution = [8, 8]", "width"),
-            ("[camera]\nlook_at = [0, 0, 0]", "target"),
-            ("[environment]\ncolor = 1", "radiance"),
-            ("[sky]\ncolor = 1", "environment"),
-            ("[[mesh]]\ntype = 'cube'", "shape"),
-            ("[[mesh]]\nshape = 'box'", "cube"),
-            ("[[mesh]]\nposition = [0, 1, 0]", "transform"),
-            ("[[mesh]]\ntransform = { position = [0, 1, 0] }", "translate"),
-            ("[[material]]\nbase_color = 1", "color"),
-            ("[[material]]\ntype = 'glass'", "dielectric"),
-        ] {
-            says(text, &format!(": did you mean \"{here}\"?"));
-        }
     }
 
     #[test]
