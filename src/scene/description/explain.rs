@@ -101,8 +101,18 @@ fn code(line: &str) -> &str {
 fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
     let field =
         message.strip_prefix("missing field ").map(|field| format!("the key {} is missing", field.replace('`', "\"")));
+    if let Some((key, path)) = bare_path(text, at) {
+        // Between double ones a backslash begins a code.
+        let quote = if path.contains('\\') { '\'' } else { '"' };
+        return Some(format!("{key} takes a text in quotes: {quote}{path}{quote}"));
+    }
     let said = match message.lines().next()? {
         m if m.starts_with("string values must be quoted") && is_end(text, at) => return Some(no_value(text, at)),
+        m if m.starts_with("string values must be quoted")
+            && text[at..].starts_with(['“', '”', '„', '‘', '’', '«']) =>
+        {
+            "a text stands between straight quotes, \" or '"
+        }
         m if m.starts_with("string values must be quoted") && has_unit(text, at) => NUMBER,
         m if m.starts_with("string values must be quoted") => {
             "texts stand in quotes, and the values of a list have commas between them"
@@ -115,6 +125,10 @@ fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
         m if m.starts_with("unexpected key or value") && text.get(at..).is_some_and(|rest| rest.starts_with(',')) => {
             comma(text, at)
         }
+        m if m.starts_with("key with no value") || m.starts_with("invalid key-value pair") => {
+            "a line is the header of a table, such as [film], or a key with its value, such as width = 512"
+        }
+        m if m.starts_with("duplicate key") => return Some(again(text, at)),
         m if m.starts_with("invalid boolean") => "texts stand in quotes, and true and false are written so",
         m if m.starts_with("wanted exactly 1 element") || m.starts_with("wanted string") => {
             return Some(word(text, at));
@@ -123,6 +137,33 @@ fn syntax(text: &str, at: usize, message: &str) -> Option<String> {
         _ => return field,
     };
     Some(said.to_owned())
+}
+
+/// What is said of the key at byte `at`, or of the table of that header, which the file has above, too.
+fn again(text: &str, at: usize) -> String {
+    let is_of_key = |c: &char| c.is_alphanumeric() || "_-.\"'".contains(*c);
+    let name: String = text.get(at..).unwrap_or_default().chars().take_while(is_of_key).collect();
+    let before = text.get(..at).and_then(|before| before.rsplit('\n').next()).unwrap_or_default();
+    match before.trim_start().starts_with('[') {
+        true => format!("the table {name} stands above, too: put all of its keys into one"),
+        false => format!("{name} stands above, too: keep one of them"),
+    }
+}
+
+/// The path without quotes in which byte `at` stands, and its key: the parser takes 01.png for a number and 2024-01-01.png for a date.
+fn bare_path(text: &str, at: usize) -> Option<(String, &str)> {
+    let line = text.get(..at)?.rfind('\n').map_or(0, |end| end + 1);
+    let from = line + 1 + text[line..at].contains('=').then(|| text[line..at].rfind(['=', '[', ',']))??;
+    let value = code(text[from..].lines().next()?).split([',', ']', '}']).next()?.trim();
+    let (_, ending) = value.rsplit_once('.').filter(|_| !value.contains(['"', '\'', '{', '=']))?;
+    if text[at..].starts_with(',') {
+        return None;
+    }
+    // 5.f and 1.e5 are meant as numbers.
+    let is_ending = ending.len() > 1 && ending.chars().all(char::is_alphanumeric);
+    let is_number = |text: &str| text.chars().all(|c| c.is_ascii_digit());
+    let is_path = is_ending && !ending.starts_with(|c: char| c.is_ascii_digit()) && !is_number(&ending[1..]);
+    is_path.then_some((key_before(text, from)?, value))
 }
 
 /// What the parser says of .5, 5., 1e, 5deg and 1.0.0.
@@ -303,13 +344,52 @@ mod tests {
     #[test]
     fn words_without_quotes_and_lists_without_commas_are_told() {
         says("[film]\nfilter = tent", "line 2: texts stand in quotes");
-        says("[[mesh]]\nfile = a.obj", "line 2: texts stand in quotes");
-        for name in ["3d.obj", "2nd room.obj", "1.obj", "1e5.png", "3.5.obj"] {
-            says(&format!("[[mesh]]\nfile = {name}"), "in quotes");
-        }
+        says("[[mesh]]\nfile = a", "line 2: texts stand in quotes");
         says("[[mesh]]\nflat = True", "true and false are written so");
         let list = "[camera]\nposition = [0 0 3]";
         ends(list, "line 2: texts stand in quotes, and the values of a list have commas between them");
+    }
+
+    /// Most begin as a number or a date does.
+    #[test]
+    fn paths_without_quotes_are_told() {
+        let numbers =
+            ["3d.obj", "2nd room.obj", "1.obj", "1e5.png", "3.5.obj", "01.png", "0x1.png", "0b1.obj", "inf.png"];
+        let dates = ["2024-01-01.png", "2024-13-01.png", "10:30:00.png", "12:30.obj", "2024-01-01T00:00:00.png"];
+        let others = ["a.obj", ".png", "../a.obj", "a b.png", "true.png", "/tmp/a.obj"];
+        for name in numbers.into_iter().chain(dates).chain(others) {
+            let told = format!("line 2: file takes a text in quotes: \"{name}\"");
+            ends(&format!("[[mesh]]\nfile = {name}"), &told);
+            ends(&format!("[[mesh]]\nfile = {name} # it's = a.b"), &told);
+            let told = format!("line 2: bump takes a text in quotes: \"{name}\"");
+            ends(&format!("[[material]]\nbump = {{ file = {name}, uv = 1 }}"), &told.replace("bump", "file"));
+        }
+        ends("[[mesh]]\nfile = C:\\x\\a.obj", "line 2: file takes a text in quotes: 'C:\\x\\a.obj'");
+        says("[film]\nwidth = 1\n[film.size", "line 3: ");
+        assert!(!parse(Path::new("s.toml"), "a = 1\n[film.size").unwrap_err().to_string().contains("quotes"));
+    }
+
+    #[test]
+    fn what_stands_twice_is_named() {
+        ends("[film]\nwidth = 1\nheight = 1\nwidth = 2", "line 4: width stands above, too: keep one of them");
+        ends(
+            "[film]\nwidth = 1\n[camera]\n[film]\n",
+            "line 4: the table film stands above, too: put all of its keys into one",
+        );
+        ends("[[mesh]]\ntransform = { scale = 1, scale = 2 }", "line 2: scale stands above, too: keep one of them");
+    }
+
+    /// Files of JSON, YAML and XML get the first, and texts that a word processor wrote the second.
+    #[test]
+    fn lines_of_other_languages_are_told() {
+        let line =
+            "line 1: a line is the header of a table, such as [film], or a key with its value, such as width = 512";
+        for text in ["{\"film\": {}}", "film:\n  width: 3", "<scene version=\"3.0.0\"></scene>", "width 512"] {
+            ends(text, line);
+        }
+        for text in ["“cube”", "„cube“", "‘cube’", "«cube»"] {
+            ends(&format!("[[mesh]]\nshape = {text}"), "line 2: a text stands between straight quotes, \" or '");
+        }
     }
 
     #[test]
