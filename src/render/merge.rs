@@ -12,12 +12,15 @@ use std::path::{Path, PathBuf};
 /// Settings in which merged renders may differ.
 const FREE: [&str; 3] = ["spp", "first_sample", "seed"];
 
+/// Stands between the programs that rendered the parts of a merged file.
+const BETWEEN: &str = ", ";
+
 /// A file to merge, of which only the header was read.
 struct Part<'a> {
     path: &'a Path,
     splits_light: bool,
-    /// The program that rendered it, with its version.
-    program: String,
+    /// The programs that rendered it, with their versions, as a file has them.
+    programs: String,
     settings: Settings,
     /// Its settings are all but [`FREE`].
     provenance: Provenance,
@@ -27,12 +30,12 @@ impl<'a> Part<'a> {
     fn open(path: &'a Path) -> Result<Self> {
         let film = image::read_head(path)?;
         let head = Head::of(&film).map_err(|what| Error::input(path, what))?;
-        let program = film.metadata.get(SOFTWARE).map_or("an unknown program", String::as_str).to_owned();
+        let programs = film.metadata.get(SOFTWARE).map_or("tallow of an unknown version", String::as_str).to_owned();
         let Head { mut provenance, settings: own, splits_light } = head;
         if let Some(settings) = provenance.settings.as_object_mut() {
             settings.retain(|key, _| !FREE.contains(&key.as_str()));
         }
-        Ok(Self { path, splits_light, program, settings: own, provenance })
+        Ok(Self { path, splits_light, programs, settings: own, provenance })
     }
 
     /// Reads the samples.
@@ -130,7 +133,9 @@ pub fn merge<P: AsRef<Path>>(files: &[P]) -> Result<Merged> {
         broken = BrokenSamples::join(broken, rendered.broken);
         pixels.iter_mut().zip(&rendered.pixels).for_each(|(a, b)| *a = join(a, b));
     }
-    let programs = parts.iter().map(|part| part.program.clone()).collect();
+    // One that was merged has several.
+    let programs: BTreeSet<_> = parts.iter().flat_map(|part| part.programs.split(BETWEEN)).map(str::to_owned).collect();
+    film.metadata.insert(SOFTWARE.to_owned(), Vec::from_iter(programs.iter().map(String::as_str)).join(BETWEEN));
     let samples = closed_up(ranges);
     film::replace_pixels(&mut film, &pixels);
     film::set_broken_samples(&mut film, broken);

@@ -146,6 +146,12 @@ fn parts_of_other_versions_are_told() {
     let told =
         format!("note: the parts are of tallow 0.0.1 and {own}: their layers direct and albedo may hold other light");
     complains(&run(&folder, "merge a.exr older.exr -o whole.exr"), 0, &[&told]);
+    // What reads the file next is told so, too, and by a merge of merged files once.
+    let both = format!("tallow 0.0.1, {own}");
+    assert_eq!(read(&folder, "whole.exr").metadata["software"], both);
+    well(render(&folder, "--spp 2 --first-sample 4 -o c.exr"));
+    complains(&run(&folder, "merge c.exr whole.exr -o more.exr"), 0, &[&told]);
+    assert_eq!(read(&folder, "more.exr").metadata["software"], both);
     well(run(&folder, "merge a.exr b.exr -o whole.exr"));
 }
 
