@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use image::ImageFormat;
 use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::{ErrorKind, Read, Seek};
 use std::path::Path;
 
 /// Opens a regular file. A pipe is refused because one without a writer would never end.
@@ -14,10 +14,27 @@ use std::path::Path;
 pub fn open(path: &Path) -> Result<File> {
     let about = |e| Error::input(path, remedy(&e));
     match std::fs::metadata(path).map_err(about)? {
-        kind if kind.is_file() => File::open(path).map_err(about),
+        kind if kind.is_file() => {
+            let mut file = File::open(path).map_err(about)?;
+            if begins_with(&mut file, POINTER).map_err(about)? {
+                return Err(Error::input(path, "is a pointer of Git LFS in place of the file: run git lfs pull there"));
+            }
+            Ok(file)
+        }
         kind if kind.is_dir() => Err(Error::input(path, "is a folder: name a file in it")),
         _ => Err(Error::input(path, "is a pipe or a device: save what it holds as a file first")),
     }
+}
+
+/// What stands in a repository for a file that Git LFS keeps elsewhere. Read as the buffer of a glTF file it would be a mesh.
+const POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
+
+/// Whether a file does. It is read from its first byte afterwards.
+fn begins_with(file: &mut File, beginning: &[u8]) -> std::io::Result<bool> {
+    let mut head = Vec::new();
+    file.take(beginning.len() as u64).read_to_end(&mut head)?;
+    file.rewind()?;
+    Ok(head == beginning)
 }
 
 /// Reads a whole file of a kind that is never empty.

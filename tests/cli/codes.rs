@@ -132,17 +132,29 @@ fn files_in_the_place_of_others_are_told_by_what_they_are() {
     complains(&run("filter a.exr -o b.exr --samples spp"), 3, &["holds no single layer \"spp\""]);
 }
 
-/// As a full disk or a copy that was broken off leaves them.
+/// As a full disk or a copy that was broken off leaves them, and a repository whose large files were not fetched.
 #[test]
-fn empty_files_are_told_to_be_empty() {
+fn files_without_what_they_are_to_hold_are_told() {
+    let pointer = format!("version https://git-lfs.github.com/spec/v1\noid sha256:{}\nsize 42\n", "0".repeat(64));
+    for (text, told) in [
+        ("", "is empty: take another copy of it"),
+        (&pointer, "is a pointer of Git LFS in place of the file: run git lfs pull there"),
+    ] {
+        check_files_that_hold(text, told);
+    }
+}
+
+fn check_files_that_hold(text: &str, told: &str) {
     let folder = tempfile::tempdir().unwrap();
     write(&folder, "a.exr", 12, 0.5);
-    for name in ["empty.exr", "empty.png", "empty.glb", "empty.gltf", "empty.hdr"] {
-        std::fs::write(folder.path().join(name), "").unwrap();
+    for name in ["empty.exr", "empty.png", "empty.glb", "empty.gltf", "empty.hdr", "empty.bin"] {
+        std::fs::write(folder.path().join(name), text).unwrap();
     }
     std::fs::write(folder.path().join("sky.toml"), "environment.file = 'empty.hdr'").unwrap();
     let picture = "[[material]]\nname = 'a'\ncolor_texture = 'empty.png'\n[[mesh]]\nshape = 'cube'\nmaterial = 'a'\n";
     std::fs::write(folder.path().join("picture.toml"), picture).unwrap();
+    let buffers = r#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 42, "uri": "empty.bin"}]}"#;
+    std::fs::write(folder.path().join("a.gltf"), buffers).unwrap();
     for (words, name) in [
         ("compare a.exr empty.exr", "empty.exr"),
         ("merge empty.exr a.exr -o b.exr", "empty.exr"),
@@ -151,9 +163,10 @@ fn empty_files_are_told_to_be_empty() {
         ("render empty.gltf", "empty.gltf"),
         ("render sky.toml -o b.exr", "empty.hdr"),
         ("render picture.toml -o b.exr", "empty.png"),
+        ("render a.gltf -o b.exr", "empty.bin"),
     ] {
         let output = tallow(&folder, &words.split(' ').collect::<Vec<_>>());
-        complains(&output, 3, &[&format!("{name}: is empty: take another copy of it")]);
+        complains(&output, 3, &[&format!("{name}: {told}")]);
     }
 }
 
