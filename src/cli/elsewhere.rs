@@ -4,11 +4,12 @@ use crate::image;
 use crate::scene::SceneFile;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error};
+use std::ffi::OsString;
 use std::path::Path;
 
-/// Of a command line that clap refuses, what the word that it does not know stands for. `all` has all commands, of which `subcommand` is
-/// the one that was named.
-pub fn tip(e: &Error, all: &Command, subcommand: Option<&Command>) -> Option<String> {
+/// Of a command line that clap refuses, what the one of its `words` that it does not know stands for. `all` has all commands, of which
+/// `subcommand` is the one that was named.
+pub fn tip(e: &Error, words: &[OsString], all: &Command, subcommand: Option<&Command>) -> Option<String> {
     let word = |kind| match e.get(kind) {
         Some(ContextValue::String(word)) => Some(word.as_str()),
         _ => None,
@@ -16,7 +17,7 @@ pub fn tip(e: &Error, all: &Command, subcommand: Option<&Command>) -> Option<Str
     match (word(ContextKind::InvalidSubcommand), word(ContextKind::InvalidArg), subcommand) {
         (Some(word), ..) => of_command(word),
         (_, Some("--list-devices"), _) => Some("here that is tallow devices".to_owned()),
-        (_, Some(word), Some(subcommand)) => of_option(word, subcommand),
+        (_, Some(word), Some(subcommand)) => of_file(word, words).or_else(|| of_option(word, subcommand)),
         (_, Some(word), None) => of_no_command(word, all),
         _ => None,
     }
@@ -36,6 +37,14 @@ pub fn misleads(e: &Error) -> bool {
 
 /// Options that are less alike, from 0 to 1, are not taken for one another: "verbose" and "denoise" have .71, "max-samples" and "max-spp" .88.
 const LEAST_LIKENESS: f64 = 0.8;
+
+/// Of a file whose name begins as an option does, of which clap tells the first letter alone.
+fn of_file(option: &str, words: &[OsString]) -> Option<String> {
+    let is_file = |name: &str| image::is_written(Path::new(name)) || SceneFile::is_named(Path::new(name));
+    let is_it = |name: &&str| option.starts_with('-') && name.starts_with(option) && is_file(name);
+    let name = words.iter().filter_map(|word| word.to_str()).find(is_it)?;
+    Some(format!("a file of such a name is {}", quoted(&format!("./{name}"))))
+}
 
 fn of_command(word: &str) -> Option<String> {
     let here = match word {

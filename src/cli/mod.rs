@@ -152,7 +152,7 @@ fn usage(e: &clap::Error, words: &[OsString]) -> Result<Exit> {
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
     let command = Cli::command();
     let subcommand = words.get(1).and_then(|word| command.find_subcommand(word));
-    let tip = elsewhere::tip(e, &command, subcommand);
+    let tip = elsewhere::tip(e, words, &command, subcommand);
     // Of an option that needs another one only the usage says the name.
     let tells = |p: &String| match e.kind() {
         ErrorKind::MissingRequiredArgument => !p.starts_with("For more"),

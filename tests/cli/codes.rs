@@ -88,6 +88,8 @@ fn words_of_other_programs_are_answered_by_those_of_this() {
         ("render s.toml --frames 0..3", "'--frames' found; tip: here that is tallow sequence --frames (see"),
         ("render s.toml --frame 3", "'--frame' found; tip: here that is tallow sequence --frames (see"),
         ("render s.toml --list-devices", "tip: here that is tallow devices (see"),
+        ("render s.toml -o -x.png", "'-x' found; tip: a file of such a name is ./-x.png (see"),
+        ("render --x.toml", "'--x.toml' found; tip: a file of such a name is ./--x.toml (see"),
         ("--list-devices", "'--list-devices' found; tip: here that is tallow devices (see"),
         // What clap takes for alike: "--denoise", "--version" and "--window".
         ("render s.toml --verbose", "unexpected argument '--verbose' found (see"),

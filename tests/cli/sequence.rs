@@ -457,6 +457,7 @@ fn options_that_cannot_be_are_one_line() {
     let folder = stage();
     for (words, part) in [
         ("--frames 0..3 -o f.exr", "choose a name as f.####.exr"),
+        ("--frames 0..3 -o f", "choose a name as f.####.exr"),
         ("--frames 3..3", "no frame lies from 3 on and before 3"),
         ("--frames 0..3 --only 5", "none of the frames"),
         ("--frames 0..4000000000", "4000000000 frames are more than 1000000"),

@@ -213,7 +213,10 @@ fn with_place(name: &str) -> String {
         return format!("{stem}{}{rest}", "#".repeat(digits));
     }
     let file = Path::new(name);
-    format!("{}.####.{}", file.with_extension("").display(), file.extension().unwrap_or_default().display())
+    match file.extension() {
+        Some(extension) => format!("{}.####.{}", file.with_extension("").display(), extension.display()),
+        None => format!("{name}.####.exr"),
+    }
 }
 
 /// What became of a frame.
