@@ -1,5 +1,5 @@
 //! `--preview`: the frames of a sequence as a small animated picture.
-use crate::cli::files::{Files, Item};
+use crate::cli::files::{Files, Item, partial_name};
 use crate::error::{Checked, Error, Result};
 use crate::image::{self, Film, WriteOptions, output};
 use ::image::codecs::gif::{GifEncoder, Repeat};
@@ -51,7 +51,8 @@ impl Preview {
     }
 
     /// Writes what there is, at so many frames per second, and returns where; nothing without a frame. Viewers show no
-    /// more than 50: others are left out. What is not of the `whole` sequence replaces no file.
+    /// more than 50: others are left out. What is not of the `whole` sequence replaces no file but what was shown at an earlier
+    /// interruption, which the whole one takes away.
     ///
     /// # Errors
     /// [`Error::Output`].
@@ -62,9 +63,15 @@ impl Preview {
         let mut bytes = Vec::new();
         self.encode(&mut bytes, fps).map_err(|e| Error::output(path, e))?;
         let (items, mut files) = ([Item::bytes(path.to_owned(), bytes)], Files::default());
+        let partial = partial_name(path);
+        files.go_on(&partial, partial.clone());
         let written = [files.save(&items, whole), files.pipe(&items, whole)].concat();
+        files.check()?;
+        if whole {
+            files.remove_partial(&items);
+        }
         files.end();
-        files.check().map(|()| written)
+        Ok(written)
     }
 
     fn encode(&self, bytes: &mut Vec<u8>, fps: f64) -> std::result::Result<(), ::image::ImageError> {
@@ -169,6 +176,26 @@ mod tests {
         few.encode(&mut bytes, 24.0).unwrap();
         let read = GifDecoder::new(std::io::Cursor::new(bytes)).unwrap().into_frames().collect_frames().unwrap();
         assert!(read.iter().all(|frame| frame.buffer() == &few.0[0]), "153 colours");
+    }
+
+    /// However often a sequence is interrupted, one file is left beside an older preview, and none once it is whole.
+    #[test]
+    fn what_is_shown_of_a_part_does_not_pile_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gif");
+        let partial = folder.path().join("a.partial.gif");
+        let of = |frames: usize| Preview(vec![RgbaImage::new(1, 1); frames]);
+        let bytes = |path: &Path| std::fs::read(path).unwrap();
+        assert_eq!(of(1).save(&path, 24.0, true).unwrap(), [path.clone()]);
+        let older = bytes(&path);
+        for frames in [2, 3] {
+            assert_eq!(of(frames).save(&path, 24.0, false).unwrap(), [partial.clone()]);
+        }
+        let read = GifDecoder::new(std::io::Cursor::new(bytes(&partial))).unwrap().into_frames();
+        assert_eq!((read.count(), bytes(&path) == older), (3, true));
+        of(4).save(&path, 24.0, true).unwrap();
+        let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert!(left == [path.clone()] && bytes(&path) != older, "{left:?}");
     }
 
     #[test]
