@@ -133,6 +133,8 @@ fn finish(
     }
     let written = folder.write(document, images, document.complete);
     args.common.report(&Report { document, warnings }, || text(document, &written))?;
+    let failed = document.points.iter().filter_map(|point| Some((point, point.failed.as_ref()?)));
+    failed.for_each(|(point, reason)| complain(&format!("error: {}: {reason}", point.method.label())));
     folder.check()?;
     match ended {
         Ended::Stopped => {

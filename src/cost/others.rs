@@ -13,9 +13,11 @@ use std::path::{Path, PathBuf};
 /// Bytes of memory that a byte of a table takes at most while it is read.
 const BYTES_OF_ROW: u64 = 16;
 
-/// A row of the table.
+/// The columns of the table, in any order.
+const COLUMNS: [&str; 6] = ["method", "filter", "spp", "seed", "ms", "image"];
+
+/// A row of the table, which has the [`COLUMNS`] as fields.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
 struct Row {
     /// Name of the renderer.
     method: String,
@@ -51,8 +53,8 @@ pub struct OtherRun {
 pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
     let text = input::read_text(path, BYTES_OF_ROW)?;
     let wrong = |what: String| Error::input(path, what);
-    let run = |row: csv::Result<Row>| {
-        let Row { method, filter, spp, seed, ms, image } = row.map_err(|e| wrong(e.to_string().replace('\n', " ")))?;
+    let run = |row: Row| {
+        let Row { method, filter, spp, seed, ms, image } = row;
         if !(ms.is_finite() && ms > 0.0) {
             return Err(wrong(format!("a time of {ms} ms: give a number above 0")));
         }
@@ -65,7 +67,7 @@ pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
         let method = Method { allocate: method, filter, spp, ..Method::default() };
         Ok(OtherRun { method, seed, ms, image: path.parent().unwrap_or(Path::new("")).join(image) })
     };
-    let runs: Vec<OtherRun> = csv::Reader::from_reader(&text[..]).deserialize().map(run).collect::<Result<_>>()?;
+    let runs: Vec<OtherRun> = rows(path, &text)?.into_iter().map(run).collect::<Result<_>>()?;
     let mut labels = BTreeMap::new();
     for run in &runs {
         let first = labels.entry(run.method.label()).or_insert(&run.method);
@@ -79,6 +81,45 @@ pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
             Err(wrong(format!("{} has seed {} twice: a seed tells its runs apart", again.method.label(), again.seed)))
         }
         None => Ok(runs),
+    }
+}
+
+fn rows(path: &Path, text: &[u8]) -> Result<Vec<Row>> {
+    let mut reader = csv::Reader::from_reader(text);
+    let at = |line: u64, what: String| Error::input_at(path, format!("line {line}"), what);
+    let damaged = |e: csv::Error| at(e.position().map_or(1, csv::Position::line), words_of(&e));
+    let names = reader.headers().map_err(damaged)?.clone();
+    if names.len() != COLUMNS.len() || !COLUMNS.iter().all(|column| names.iter().any(|name| name == *column)) {
+        let (names, columns) = (Vec::from_iter(&names).join(", "), COLUMNS.join(","));
+        return Err(at(1, format!("its columns are \"{names}\": write {columns} above the rows, with commas between")));
+    }
+    let row = |record: csv::Result<csv::StringRecord>| {
+        let record = record.map_err(damaged)?;
+        record.deserialize(Some(&names)).map_err(|e| {
+            let line = record.position().map_or(1, csv::Position::line);
+            // Texts are never wrong.
+            let field = if let csv::ErrorKind::Deserialize { err, .. } = e.kind() { err.field() } else { None };
+            let field = field.map_or(0, |field| field as usize);
+            let (name, value) = (&names[field], &record[field]);
+            let kind = if name == "ms" { "number" } else { "whole number from 0 to 4294967295" };
+            at(line, format!("{name} is \"{value}\": write a {kind}"))
+        })
+    };
+    let rows = reader.into_records().map(row).collect::<Result<Vec<_>>>()?;
+    match rows.is_empty() {
+        true => Err(Error::input(path, "has no rows: write one for each image, or leave out --points")),
+        false => Ok(rows),
+    }
+}
+
+/// What keeps a line of the table from being read.
+fn words_of(e: &csv::Error) -> String {
+    match e.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("has {len} values, and {expected_len} columns: write one for each")
+        }
+        csv::ErrorKind::Utf8 { .. } => "is no UTF-8: save the table as UTF-8".to_owned(),
+        _ => e.to_string().replace('\n', " "),
     }
 }
 
@@ -187,7 +228,15 @@ mod tests {
         };
         says("method,filter,spp,seed,ms,image\nA,none,4,7,0,a.exr\n", "a time of 0 ms");
         says("method,filter,spp,seed,ms,image\nA,none,4,7,inf,a.exr\n", "a time of inf ms");
-        says("method,filter,spp,seed,ms,image\nA,none,x,7,1,a.exr\n", "line: 2");
+        says(
+            "method,filter,spp,seed,ms,image\nA,none,x,7,1,a.exr\n",
+            "csv, line 2: spp is \"x\": write a whole number from 0",
+        );
+        says("seed,filter,spp,method,ms,image\n-1,none,4,A,7,a.exr\n", "csv, line 2: seed is \"-1\": write a whole");
+        says(
+            "method,filter,spp,seed,ms,image\nA,none,4,7,1\u{20ac},a.exr\n",
+            "csv, line 2: ms is \"1\u{20ac}\": write a number",
+        );
         says("method,filter,spp,seed,ms,image\nA,none,0,7,1,a.exr\n", "A took 0 samples a pixel");
         says("method,filter,spp,seed,ms,image\nuniform,none,4,7,1,a.exr\n", "uniform is a policy");
         says("method,filter,spp,seed,ms,image\nA,none,4,7,1,a.exr\nA,none,4,7,2,b.exr\n", "A, 4 spp has seed 7 twice");
@@ -195,7 +244,13 @@ mod tests {
             "method,filter,spp,seed,ms,image\nA + x,none,4,7,1,a.exr\nA,x,4,8,2,b.exr\n",
             "two methods are called A + x, 4 spp",
         );
-        says("method,filter,spp,seed,ms,image\nA,none,4,7\n", "line: 2");
-        says("method,spp\nA,4\n", "missing field");
+        says("method,filter,spp,seed,ms,image\nA,none,4,7\n", "csv, line 2: has 4 values, and 6 columns");
+        let columns = "write method,filter,spp,seed,ms,image above the rows, with commas between";
+        says("method,spp\nA,4\n", &format!("csv, line 1: its columns are \"method, spp\": {columns}"));
+        says("method;filter;spp;seed;ms;image\nA;none;4;7;1;a.exr\n", columns);
+        says("method,filter,spp,seed,ms,image,more\nA,none,4,7,1,a.exr,1\n", columns);
+        says("A,none,4,7,1,a.exr\n", columns);
+        says("", columns);
+        says("method,filter,spp,seed,ms,image\n", "csv: has no rows: write one for each image");
     }
 }

@@ -203,11 +203,6 @@ pub fn text(document: &Document, written: &[PathBuf]) -> String {
         let head = ["without the option", "option", "GPU time", "relMSE", "relMSE x time"];
         text += &format!("\nfactors by options\n{}", text_table::text(&head, &changes));
     }
-    for point in &document.points {
-        if let Some(reason) = &point.failed {
-            text += &format!("failed: {}: {}\n", readable(&point.method.label()), readable(reason));
-        }
-    }
     text += "\n";
     text.extend(document.reference.notes.iter().map(|note| format!("{}\n", readable(note))));
     text.extend(document.findings.iter().map(|finding| format!("{}\n", readable(&finding.text))));

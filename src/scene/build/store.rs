@@ -250,7 +250,7 @@ impl<'a, 'l> Addition<'a, 'l> {
         let soft = (self.table.moving && !self.job.exact).then(|| self.soft(&file));
         let repaired = repairs.warning(&self.place);
         if geometry.triangles.len() == before {
-            let why = repaired.as_deref().unwrap_or("no face is in it: is it an OBJ file?");
+            let why = repaired.as_deref().unwrap_or("no face is in it: is it of the format that its name says?");
             // It may be placed so small that no triangle is left of it, which is no fault of the file.
             match sources.file_of(self.table).filter(|_| !self.has_surface(&file)) {
                 Some(path) => return Err(Error::input(path, format!("has no triangles: {why}"))),
