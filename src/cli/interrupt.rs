@@ -68,7 +68,9 @@ pub fn leave(line: &str) -> ! {
     exit(Exit::Interrupted as i32)
 }
 
-/// Ends the process from any thread without unwinding, because a driver may be in the middle of a call.
+/// Ends the process from any thread without unwinding, because a driver may be in the middle of a call. Where all cores are busy with
+/// others, Linux may take seconds to return its memory: the thread that is last does that, which may be one that the driver gave the
+/// least priority (Mesa's for its cache of kernels). All is said and written by then.
 pub fn exit(code: i32) -> ! {
     output::remove_unfinished();
     #[cfg(unix)]
