@@ -176,12 +176,13 @@ pub fn bytes_per_pixel(method: Method) -> u64 {
 }
 
 /// Bytes of host memory that filtering the film of a render takes at most once its renderer is gone: the film that was read
-/// back, the filtered colour, what the filter takes of the host, and where the device is `unified`, as for [`film::host_bytes`], its
-/// buffers too.
+/// back, the filtered colour, what the filter takes of the host, and where the device has no memory of its own
+/// ([`DeviceInfo::unified`](crate::gpu::DeviceInfo::unified)) its buffers too.
 pub fn host_bytes(method: Method, settings: &Settings, unified: bool) -> u64 {
     let device = if unified { bytes_per_pixel(method) } else { 0 };
     let colour = size_of::<vec3>() as u64;
-    film::host_bytes(settings, false) + settings.pixels() as u64 * (device + colour + method.host_bytes())
+    let film = film::bytes_per_pixel(!settings.allocate.is_even());
+    settings.pixels() as u64 * (film + device + colour + method.host_bytes())
 }
 
 /// Checks that the host has room for a render with these settings, and then for each of these filters of its film.
@@ -190,7 +191,7 @@ pub fn host_bytes(method: Method, settings: &Settings, unified: bool) -> u64 {
 /// What it needs and what there is.
 pub(crate) fn check_room(filters: impl IntoIterator<Item = Method>, settings: &Settings, unified: bool) -> Checked {
     let filtered = filters.into_iter().map(|method| host_bytes(method, settings, unified)).max().unwrap_or(0);
-    memory::check_beside_driver(film::host_bytes(settings, unified).max(filtered))
+    memory::check_beside_driver(film::host_bytes(settings).max(filtered))
 }
 
 /// The filter's own buffers last no longer than this, but for what it expects of its errors. What ran on the host is timed by its

@@ -159,6 +159,11 @@ impl Hazards {
         conflict
     }
 
+    /// Those that the recording uses.
+    pub fn buffers(&self) -> impl Iterator<Item = &Untyped> {
+        self.kept.values().map(|buffer| &**buffer)
+    }
+
     /// Forgets all accesses and releases the buffers. The work that used them must be complete.
     pub fn clear(&mut self) {
         self.touched.clear();

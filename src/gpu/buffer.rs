@@ -8,7 +8,7 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::{AllocationError, MemoryLocation};
 use std::marker::PhantomData;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// A part of a buffer begins at a multiple of this many elements. An element has at least 4 bytes, so the offset is a
 /// multiple of 256 bytes, the largest alignment that Vulkan lets a device require.
@@ -94,8 +94,10 @@ pub struct Untyped {
     stride: u64,
     /// Bytes of one texel, for kernels that read it so.
     texel: u64,
-    /// `None` only during construction. The lock also serialises accesses by the host.
-    memory: Mutex<Option<Allocation>>,
+    /// The lock also serialises accesses by the host.
+    memory: Mutex<Memory>,
+    /// Told when a submission that uses it is complete.
+    released: Condvar,
     views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
 }
 
@@ -142,7 +144,7 @@ impl<T: Pod> Buffer<T> {
 
     fn holding(self, values: &[T]) -> Result<Self> {
         let zero = [T::zeroed()];
-        self.write_new(0, if values.is_empty() { &zero } else { values })?;
+        self.write(0, if values.is_empty() { &zero } else { values })?;
         Ok(self)
     }
 
@@ -182,22 +184,13 @@ impl<T: Pod> Buffer<T> {
         self.len
     }
 
-    /// Waits for the work that [`Gpu::run`] submitted, then replaces the elements from `offset` on. For work recorded with
-    /// [`super::Recorder::external`], see its safety section.
+    /// Waits for the work on this buffer that [`Gpu::run`] submitted, then replaces the elements from `offset` on. For work recorded
+    /// with [`super::Recorder::external`], see its safety section.
     ///
     /// # Errors
     /// [`Error::Device`] when they do not fit, or the copy fails.
     pub fn write(&self, offset: usize, values: &[T]) -> Result<()> {
         self.untyped.write(self.place(offset, values.len())?, bytemuck::cast_slice(values))
-    }
-
-    /// As [`Self::write`], into a buffer that was just made: no work has it yet, so that it waits for none where host and device share
-    /// one memory.
-    ///
-    /// # Errors
-    /// As [`Self::write`].
-    pub(crate) fn write_new(&self, offset: usize, values: &[T]) -> Result<()> {
-        self.untyped.write_new(self.place(offset, values.len())?, bytemuck::cast_slice(values))
     }
 
     /// Bytes from the start of the memory to so many elements from `offset` on, where they fit.
@@ -209,7 +202,7 @@ impl<T: Pod> Buffer<T> {
         Ok((self.first + offset) * size_of::<T>())
     }
 
-    /// Waits for the work that [`Gpu::run`] submitted, then returns all elements. For work recorded with
+    /// Waits for the work on this buffer that [`Gpu::run`] submitted, then returns all elements. For work recorded with
     /// [`super::Recorder::external`], see its safety section.
     ///
     /// # Errors
@@ -229,6 +222,11 @@ impl<T: Pod> Buffer<T> {
         let mut values = vec![T::zeroed(); range.len()];
         self.untyped.read((self.first + range.start) * size_of::<T>(), bytemuck::cast_slice_mut(&mut values))?;
         Ok(values)
+    }
+
+    /// Whether [`Self::read`] takes no submission.
+    pub(crate) fn is_read_in_place(&self) -> bool {
+        self.untyped.idle().mapped(self.untyped.for_reading()).is_some()
     }
 
     fn no_part(&self, range: &Range<usize>) -> Error {
@@ -317,13 +315,14 @@ impl Untyped {
         // SAFETY: `info` is complete; the device outlives every buffer.
         let raw = unsafe { gpu.0.device.create_buffer(&info, None) }.at(&what)?;
         gpu.0.name(raw, name);
-        let (memory, views) = Default::default();
+        let (memory, released, views) = Default::default();
         // From here on, Drop cleans up if a line below fails.
         let (name, gpu) = (name.to_owned(), gpu.clone());
-        let buffer = Self { gpu, name, raw, size, shown, location, stride, texel, memory, views };
+        let buffer = Self { gpu, name, raw, size, shown, location, stride, texel, memory, released, views };
         buffer.allocate(location, &what)?;
-        let no_more = vk::MemoryPropertyFlags::empty();
-        buffer.mapped(no_more, |bytes| bytes[size as usize..shown as usize].fill(0));
+        if let Some(bytes) = buffer.idle().mapped(vk::MemoryPropertyFlags::empty()) {
+            bytes[size as usize..shown as usize].fill(0);
+        }
         Ok(buffer)
     }
 
@@ -356,24 +355,68 @@ impl Untyped {
         })?;
         // SAFETY: fresh memory that fits the requirements, kept until the buffer is destroyed.
         let bound = unsafe { device.bind_buffer_memory(self.raw, memory.memory(), memory.offset()) };
-        *self.memory.lock().unwrap_or_else(PoisonError::into_inner) = Some(memory);
+        self.lock().allocation = Some(memory);
         bound.at(what)
     }
 
-    /// Calls `access` with the mapped bytes. Returns `None` if the memory is not mapped, not coherent, or lacks a property in
-    /// `also`.
-    pub(super) fn mapped<R>(&self, also: vk::MemoryPropertyFlags, access: impl FnOnce(&mut [u8]) -> R) -> Option<R> {
-        let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
-        let memory = memory.as_mut()?;
+    fn lock(&self) -> MutexGuard<'_, Memory> {
+        self.memory.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until no submission uses it. None that does begins until the returned lock is dropped.
+    pub(super) fn idle(&self) -> MutexGuard<'_, Memory> {
+        let is_used = |memory: &mut Memory| memory.submissions > 0;
+        self.released.wait_while(self.lock(), is_used).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What its memory must be for the host to read it where it lies. Integrated GPUs can map uncached memory, which is fast to write but
+    /// slow to read; a copy of a buffer for reading would lie in memory of the same kind.
+    pub(super) fn for_reading(&self) -> vk::MemoryPropertyFlags {
+        match self.location {
+            Location::Readback => vk::MemoryPropertyFlags::empty(),
+            Location::Device | Location::Upload => vk::MemoryPropertyFlags::HOST_CACHED,
+        }
+    }
+
+    /// Keeps the host from the memory, for a submission, until what is returned is dropped.
+    pub(super) fn used(&self) -> Used<'_> {
+        self.lock().submissions += 1;
+        Used(self)
+    }
+}
+
+/// What holds the values of a buffer.
+#[derive(Default)]
+pub(super) struct Memory {
+    /// `None` only during construction.
+    allocation: Option<Allocation>,
+    /// Submissions that use it and are not complete.
+    submissions: usize,
+}
+
+impl Memory {
+    /// The mapped bytes; `None` if the memory is not mapped, not coherent, or lacks a property in `also`.
+    pub fn mapped(&mut self, also: vk::MemoryPropertyFlags) -> Option<&mut [u8]> {
+        let memory = self.allocation.as_mut()?;
         let fits = memory.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT | also);
-        memory.mapped_slice_mut().filter(|_| fits).map(access)
+        memory.mapped_slice_mut().filter(|_| fits)
+    }
+}
+
+/// A buffer that a submission uses.
+pub(super) struct Used<'a>(&'a Untyped);
+
+impl Drop for Used<'_> {
+    fn drop(&mut self) {
+        self.0.lock().submissions -= 1;
+        self.0.released.notify_all();
     }
 }
 
 impl Drop for Untyped {
     fn drop(&mut self) {
         let views = std::mem::take(self.views.get_mut().unwrap_or_else(PoisonError::into_inner));
-        let memory = self.memory.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        let memory = self.memory.get_mut().unwrap_or_else(PoisonError::into_inner).allocation.take();
         self.gpu.0.free(|device| {
             // SAFETY: not in use, since whoever records a buffer keeps it until the work is complete; destroyed once.
             unsafe {

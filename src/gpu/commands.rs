@@ -1,5 +1,5 @@
 //! A command buffer with its pool and fence, which is recorded, submitted and waited for.
-use super::{At, Gpu, explain};
+use super::{At, Gpu, Untyped, explain};
 use crate::error::{Error, Result};
 use ash::vk;
 
@@ -42,18 +42,20 @@ impl Commands {
         }
     }
 
-    /// Ends and submits the recording, and waits as long as the value of `progress` keeps changing. `last_pass` names the last
-    /// pass that started, if it is known, for the message about a lost device.
+    /// Ends and submits the recording, which uses `buffers`, and waits as long as the value of `progress` keeps changing. `last_pass`
+    /// names the last pass that started, if it is known, for the message about a lost device.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::Device`]. Nothing of the submission runs then, unless the device was abandoned.
-    pub fn submit_and_wait(
+    pub fn submit_and_wait<'a>(
         &self,
+        buffers: impl IntoIterator<Item = &'a Untyped>,
         progress: impl Fn() -> usize,
         last_pass: impl FnOnce() -> Option<&'static str>,
     ) -> Result<()> {
         // SAFETY: the buffer is recording.
         unsafe { self.gpu.0.device.end_command_buffer(self.buffer) }.at("recording")?;
+        let _used: Vec<_> = buffers.into_iter().map(Untyped::used).collect();
         self.gpu.0.submit_and_wait(self.buffer, self.fence, progress).map_err(|code| {
             match (explain("running", code), last_pass()) {
                 (Error::DeviceLost(what), Some(pass)) => {

@@ -16,7 +16,7 @@ use std::ffi::{CStr, CString};
 use std::mem::ManuallyDrop;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockWriteGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Default time to wait for a GPU while no pass begins or ends. Passes are sized to take a fraction of a second, so even
@@ -63,8 +63,6 @@ pub(super) struct Inner {
     /// `None` where rays are traced by compute kernels alone.
     pub ray_queries: Option<RayQueries>,
     queue: Mutex<vk::Queue>,
-    /// Each submission holds a read lock until it is complete; accesses to device memory by the host take the write lock.
-    running: RwLock<()>,
     /// Limit of [`Self::wait`] in nanoseconds.
     wait_limit: u64,
     /// Whether the device was lost: nothing more is asked of it.
@@ -134,7 +132,6 @@ impl Gpu {
             calibrated,
             ray_queries,
             queue: Mutex::new(queue),
-            running: RwLock::new(()),
             wait_limit: limit.as_nanos().try_into().unwrap_or(u64::MAX),
             lost: AtomicBool::new(false),
             abandoned: AtomicBool::new(false),
@@ -232,7 +229,6 @@ impl Inner {
     ) -> std::result::Result<(), vk::Result> {
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
         let submit = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
-        let _running = self.running.read().unwrap_or_else(PoisonError::into_inner);
         // SAFETY: the buffer is complete, the fence unsignalled, and the lock keeps the queue to this thread.
         let submitted = unsafe {
             let reset = self.device.reset_fences(&[fence]);
@@ -273,11 +269,6 @@ impl Inner {
 
     fn lock_queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Waits until no submission runs. None can begin until the returned lock is dropped.
-    pub fn idle(&self) -> RwLockWriteGuard<'_, ()> {
-        self.running.write().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Remembers a failure that says that the device is lost, or that it is given up as lost.

@@ -141,7 +141,7 @@ impl FrameResources {
     }
 
     pub(super) fn submit_and_wait(&self) -> Result<()> {
-        self.commands.submit_and_wait(|| self.timer.written(), || self.timer.last_started())
+        self.commands.submit_and_wait(self.hazards.buffers(), || self.timer.written(), || self.timer.last_started())
     }
 
     /// Keeps a kernel until the work is complete.

@@ -3,7 +3,8 @@ use super::acceleration::Handles;
 use super::kernel::Compiled;
 use super::shape::{KernelCode, PassShape};
 use super::{
-    Acceleration, Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, SlotKind, Untyped, access,
+    Acceleration, Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, Location, PassTime, SlotKind, Untyped,
+    access,
 };
 use crate::error::{Error, Result};
 use ash::vk;
@@ -191,6 +192,16 @@ impl<'a> Recorder<'a> {
         self.pass("copy", &accesses, shape, &|device, commands| unsafe {
             device.cmd_copy_buffer(commands, from.raw, to.raw, &region);
         })
+    }
+
+    /// Copies all of `src` to memory that the host reads without another submission, once this one is complete.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when memory is out.
+    pub(crate) fn copied<T: Pod>(&mut self, src: &Buffer<T>) -> Result<Buffer<T>> {
+        let copy = Buffer::new(self.gpu, "copy for the host", src.len(), Location::Readback)?;
+        self.copy(src, &copy)?;
+        Ok(copy)
     }
 
     /// Sets every 32-bit word of `buffer` to `value`.

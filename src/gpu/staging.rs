@@ -3,55 +3,39 @@ use super::commands::Commands;
 use super::{Gpu, Location, Untyped, access};
 use crate::error::{Error, Result};
 use ash::vk;
-use std::sync::RwLockWriteGuard;
 
 /// Largest size of the mapped buffer in bytes.
 const CHUNK: usize = 64 << 20;
 
 impl Untyped {
-    /// Waits for the device, then writes `bytes` from byte `offset` on.
+    /// Waits for the work on it, then writes `bytes` from byte `offset` on.
     ///
     /// # Errors
     /// Those of the device.
     pub(super) fn write(&self, offset: usize, bytes: &[u8]) -> Result<()> {
-        self.put(offset, bytes, Some(self.gpu.0.idle()))
-    }
-
-    /// Writes bytes at an offset into a buffer that was just made: no work has it yet, so that there is none to wait for.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub(super) fn write_new(&self, offset: usize, bytes: &[u8]) -> Result<()> {
-        self.put(offset, bytes, None)
-    }
-
-    fn put(&self, offset: usize, bytes: &[u8], idle: Option<RwLockWriteGuard<'_, ()>>) -> Result<()> {
+        let mut memory = self.idle();
         self.gpu.0.answers()?;
-        let any = vk::MemoryPropertyFlags::empty();
-        let copied = self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes));
-        drop(idle); // An upload is a submission, which would wait for this lock for ever.
-        match copied {
-            Some(()) => Ok(()),
-            None => upload(self, offset, bytes),
+        if let Some(all) = memory.mapped(vk::MemoryPropertyFlags::empty()) {
+            all[offset..offset + bytes.len()].copy_from_slice(bytes);
+            return Ok(());
         }
+        drop(memory); // An upload is a submission, which would wait for this lock for ever.
+        upload(self, offset, bytes)
     }
 
-    /// Waits for the device, then reads from byte `offset` on.
+    /// Waits for the work on it, then reads from byte `offset` on.
     ///
     /// # Errors
     /// Those of the device.
     pub(super) fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<()> {
+        let mut memory = self.idle();
         self.gpu.0.answers()?;
-        // Integrated GPUs can map uncached memory, which is fast to write but slow to read.
-        let (length, cached) = (bytes.len(), vk::MemoryPropertyFlags::HOST_CACHED);
-        let copied = {
-            let _idle = self.gpu.0.idle();
-            self.mapped(cached, |all| bytes.copy_from_slice(&all[offset..offset + length]))
-        };
-        match copied {
-            Some(()) => Ok(()),
-            None => download(self, offset, bytes),
+        if let Some(all) = memory.mapped(self.for_reading()) {
+            bytes.copy_from_slice(&all[offset..offset + bytes.len()]);
+            return Ok(());
         }
+        drop(memory);
+        download(self, offset, bytes)
     }
 }
 
@@ -88,9 +72,9 @@ impl Staging {
     }
 
     fn access(&self, access: impl FnOnce(&mut [u8])) -> Result<()> {
-        self.buffer
-            .mapped(vk::MemoryPropertyFlags::empty(), access)
-            .ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))
+        let mut memory = self.buffer.idle();
+        let mapped = memory.mapped(vk::MemoryPropertyFlags::empty());
+        mapped.map(access).ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))
     }
 
     /// Copies one region and waits until the copy is complete.
@@ -103,7 +87,7 @@ impl Staging {
             device.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &[region]);
             access::whole_barrier(device, self.commands.buffer);
         }
-        self.commands.submit_and_wait(|| 0, || Some("copy"))
+        self.commands.submit_and_wait([from, to], || 0, || Some("copy"))
     }
 }
 

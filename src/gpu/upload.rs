@@ -64,14 +64,15 @@ impl Uploads {
     ) -> Result<(Buffer<u32>, usize)> {
         let (buffer, word) = self.room(gpu, bytes / 4)?;
         let first = 4 * word;
-        let copied = buffer.bound().buffer.mapped(vk::MemoryPropertyFlags::empty(), |all| {
-            let mut at = first;
-            for part in parts {
-                all[at..at + part.len()].copy_from_slice(part);
-                at += part.len();
-            }
-        });
-        copied.ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))?;
+        let mut memory = buffer.bound().buffer.idle();
+        let unmapped = || Error::Device("the device has no memory that the host can map".into());
+        let all = memory.mapped(vk::MemoryPropertyFlags::empty()).ok_or_else(unmapped)?;
+        let mut at = first;
+        for part in parts {
+            all[at..at + part.len()].copy_from_slice(part);
+            at += part.len();
+        }
+        drop(memory);
         Ok((buffer, first))
     }
 }

@@ -1,6 +1,6 @@
 //! The buffers of a render: the scene's, the film's, and what is in flight. `P` pixels, `B` paths in flight.
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Gpu, Location, PART, thread_items};
+use crate::gpu::{Buffer, Gpu, Location, PART, Recorder, thread_items};
 use crate::layout::*;
 use crate::render::pass::counts::Counts;
 use crate::render::schedule::Batch;
@@ -196,6 +196,7 @@ fn whole_windows(tile: u64, binding: u64) -> [u32; 2] {
 }
 
 /// A run of the film's pixels, row-major, that fits the device's buffers.
+#[derive(Clone)]
 pub struct FilmTile {
     /// Index of its first pixel in the film.
     pub first_pixel: u32,
@@ -272,6 +273,19 @@ impl FilmTile {
     pub(super) fn keep_points(&mut self, points: Buffer<SurfacePoint>) {
         self.points = points;
         self.kept.points = true;
+    }
+
+    /// Records copies of what a film is read from, which the host reads once the recording is complete.
+    pub(super) fn copied(&self, rec: &mut Recorder) -> Result<Self> {
+        Ok(Self {
+            stats: rec.copied(&self.stats)?,
+            light: rec.copied(&self.light)?,
+            guide: rec.copied(&self.guide)?,
+            seen: rec.copied(&self.seen)?,
+            blur: rec.copied(&self.blur)?,
+            points: self.points.clone(),
+            ..*self
+        })
     }
 
     fn new(gpu: &Gpu, range: Range<u32>, window: u32, effects: &Effects, guides: bool) -> Result<Self> {

@@ -1,6 +1,6 @@
 //! What a renderer's buffers hold, as the channels of an image file, and back.
 use crate::error::{Checked, Result};
-use crate::gpu::Buffer;
+use crate::gpu::{Buffer, FrameResources};
 use crate::image::{FILTERED, Film, NOISY, Samples};
 use crate::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::render::buffers::FilmTile;
@@ -52,13 +52,11 @@ pub(crate) fn bytes_per_pixel(placed: bool) -> u64 {
     (size_of::<f32>() * (CHANNELS + if placed { 2 } else { 0 })) as u64 // priority, pending
 }
 
-/// Bytes of host memory that a render with these settings takes at most when its film is read back, the scene not counted.
-/// `unified`: the device has no memory of its own ([`DeviceInfo::unified`](crate::gpu::DeviceInfo::unified)), so that its
-/// buffers count.
-pub fn host_bytes(settings: &Settings, unified: bool) -> u64 {
+/// Bytes of host memory that a render with these settings takes at most when its film is read back, the scene not counted: the film,
+/// and its buffers, or, where the device has memory of its own, copies of them.
+pub fn host_bytes(settings: &Settings) -> u64 {
     let placed = !settings.allocate.is_even();
-    let device = if unified { FilmBuffers::bytes_per_pixel(placed) } else { 0 };
-    settings.pixels() as u64 * (device + bytes_per_pixel(placed))
+    settings.pixels() as u64 * (FilmBuffers::bytes_per_pixel(placed) + bytes_per_pixel(placed))
 }
 
 /// Reads the buffers back into a film with the layers that the renderer was asked for. [`super::Job::film`] adds where
@@ -67,10 +65,31 @@ pub fn host_bytes(settings: &Settings, unified: bool) -> u64 {
 /// # Errors
 /// [`crate::error::Error::Device`].
 pub fn read_back(renderer: &Renderer) -> Result<Film> {
+    let of_device = renderer.film();
+    if of_device.tiles[0].stats.is_read_in_place() {
+        return read(renderer, &of_device.tiles, &of_device.counts.priority);
+    }
+    let (tiles, priority) = copied(renderer)?;
+    read(renderer, &tiles, &priority)
+}
+
+/// Copies for the host of what a film is read from. One submission makes them all, since each waits for work of other threads that was
+/// submitted before.
+fn copied(renderer: &Renderer) -> Result<(Vec<FilmTile>, Buffer<f32>)> {
+    let (of_device, mut tiles, mut priority) = (renderer.film(), Vec::new(), None);
+    renderer.gpu.run(&mut FrameResources::new(&renderer.gpu)?, |rec| {
+        tiles = of_device.tiles.iter().map(|tile| tile.copied(rec)).collect::<Result<_>>()?;
+        priority = Some(rec.copied(&of_device.counts.priority)?);
+        Ok(())
+    })?;
+    Ok((tiles, priority.expect("recorded")))
+}
+
+fn read(renderer: &Renderer, tiles: &[FilmTile], priority: &Buffer<f32>) -> Result<Film> {
     let (settings, outputs) = (renderer.settings(), renderer.outputs());
     let mut film = Film::new(settings.width, settings.height);
-    // A batch at a time: whole buffers beside the film would be as large again.
-    for tile in &renderer.film().tiles {
+    // A batch at a time, so that its records are in the cache when they become channels.
+    for tile in tiles {
         let pixels = tile.stats.len();
         for first in (0..pixels).step_by(BATCH) {
             film.append(&Records::read(tile, first..pixels.min(first + BATCH), outputs)?.films());
@@ -78,7 +97,7 @@ pub fn read_back(renderer: &Renderer) -> Result<Film> {
     }
     drop_remainders_of_none(&mut film);
     if !settings.allocate.is_even() {
-        film.add(PRIORITY, Samples::F32(renderer.film().counts.priority.read()?));
+        film.add(PRIORITY, Samples::F32(priority.read()?));
     }
     Ok(film)
 }
@@ -342,10 +361,9 @@ mod tests {
         // Statistics, light, a guide, another of what is seen, and the lens's blur; 38 channels. Placed: 24 bytes more, and 2 channels.
         let records = (size_of::<PixelStats>() + size_of::<PixelLight>() + 2 * size_of::<Guide>() + 4) as u64;
         let mut settings = Settings { width: 3, height: 2, ..Settings::default() };
-        assert_eq!(host_bytes(&settings, true), 6 * (records + 4 * 38));
+        assert_eq!(host_bytes(&settings), 6 * (records + 4 * 38));
         settings.allocate.policy = &crate::allocate::both::ROW;
-        assert_eq!(host_bytes(&settings, false), 6 * 4 * 40);
-        assert_eq!(host_bytes(&settings, true), 6 * (records + 24 + 4 * 40));
+        assert_eq!(host_bytes(&settings), 6 * (records + 24 + 4 * 40));
     }
 
     #[test]

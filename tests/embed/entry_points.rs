@@ -14,8 +14,9 @@ use tallow::denoise::filter::{self, FilterSettings, firefly::Fireflies};
 use tallow::denoise::{Demodulation, Denoiser};
 use tallow::error::Error;
 use tallow::gpu::{Buffer, FrameResources, Gpu, RawDevice, Recorder};
+use tallow::image::Samples;
 use tallow::render::settings::Settings;
-use tallow::render::{Moves, Outputs, Renderer, Reproject, Step};
+use tallow::render::{Job, Moves, Outputs, Renderer, Reproject, Step, film};
 use tallow::scene::{Loaded, Scene};
 
 /// Counts are asked for, so that every kind of pass takes part.
@@ -221,26 +222,78 @@ fn a_renderer_is_made_while_a_submission_runs() {
     let engine = Engine::new();
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
-    let buffer = Buffer::from_slice(&gpu, "in use", &[1u32]).unwrap();
-    let mut frame = FrameResources::new(&gpu).unwrap();
-    let ((running, runs), (made, makes)) = (mpsc::channel(), mpsc::channel());
+    let scene = scene();
+    let made =
+        is_done_meanwhile(&gpu, || drop(Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap()));
+    assert!(made || !gpu.info().unified, "it was made while the submission ran");
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// Nor does one that reads a film that nobody renders.
+#[test]
+fn a_film_is_read_while_a_submission_runs() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let scene = scene();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    let job = Job::new(&renderer);
+    let status = job.run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
+    let read = is_done_meanwhile(&gpu, || drop(job.film(&status).unwrap()));
+    assert!(read || !gpu.info().unified, "it was read while the submission ran");
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// Whether another thread does something before a submission ends that waits for it, though not for long.
+fn is_done_meanwhile(gpu: &Gpu, work: impl FnOnce() + Send) -> bool {
+    let buffer = Buffer::from_slice(gpu, "in use", &[1u32]).unwrap();
+    let mut frame = FrameResources::new(gpu).unwrap();
+    let ((running, runs), (done, does)) = (mpsc::channel(), mpsc::channel());
     let seen = Arc::new(AtomicBool::new(false));
     let was_seen = seen.clone();
     *hooks::BEFORE_WAIT.lock().unwrap() = Some(Box::new(move || {
         running.send(()).unwrap();
-        was_seen.store(makes.recv_timeout(Duration::from_secs(10)).is_ok(), SeqCst);
+        was_seen.store(does.recv_timeout(Duration::from_secs(10)).is_ok(), SeqCst);
     }));
     std::thread::scope(|scope| {
-        let (gpu, scene) = (&gpu, scene());
         scope.spawn(move || {
             runs.recv().unwrap();
-            let _ = made.send(Renderer::new(gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap());
+            work();
+            let _ = done.send(());
         });
         gpu.run(&mut frame, |rec| rec.fill(&buffer, 7)).unwrap();
     });
     *hooks::BEFORE_WAIT.lock().unwrap() = None;
-    assert!(seen.load(SeqCst) || !gpu.info().unified, "it was made while the submission ran");
+    seen.load(SeqCst)
+}
+
+/// What the host does not read where it lies is copied, all parts of a film by one submission.
+#[test]
+fn a_film_that_is_copied_takes_one_submission() {
+    let engine = Engine::new();
+    let scene = scene();
+    let film = |uncached| {
+        hooks::UNCACHED.store(uncached, SeqCst);
+        // SAFETY: the engine's handles are valid and outlive what is made from them.
+        let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+        hooks::UNCACHED.store(false, SeqCst);
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+        Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
+        hooks::take_calls();
+        let film = film::read_back(&renderer).unwrap();
+        let submitted = hooks::take_calls().remove("vkQueueSubmit2").unwrap_or(0);
+        assert_eq!(submitted, usize::from(uncached || !gpu.info().unified));
+        film.channels.into_iter().map(|c| (c.name, bits(&c.samples))).collect::<Vec<_>>()
+    };
+    assert!(film(true) == film(false), "the bits are the same");
     assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+fn bits(samples: &Samples) -> Vec<u32> {
+    match samples {
+        Samples::F32(values) => values.iter().map(|v| v.to_bits()).collect(),
+        Samples::U32(values) => values.clone(),
+    }
 }
 
 /// Memory that the host maps is not touched while a submission that may use it runs, whoever asks.

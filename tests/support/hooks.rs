@@ -17,6 +17,9 @@ pub static MOST_BYTES: AtomicU64 = AtomicU64::new(u64::MAX);
 /// While it is not 0, what every wait for a fence returns, without waiting.
 pub static WAIT: AtomicI32 = AtomicI32::new(0);
 
+/// While set, no memory that the host maps is cached, as on some integrated graphics cards: reading a buffer takes a copy.
+pub static UNCACHED: AtomicBool = AtomicBool::new(false);
+
 /// Called before every wait for a fence.
 pub static BEFORE_WAIT: Mutex<Option<Box<dyn Fn() + Send>>> = Mutex::new(None);
 
@@ -92,11 +95,32 @@ unsafe extern "system" fn get_instance_proc_addr(
 ) -> vk::PFN_vkVoidFunction {
     unsafe {
         let found = INSTANCE_LOADER.get()(instance, name);
-        if CStr::from_ptr(name) != c"vkGetDeviceProcAddr" {
-            return found;
+        let ours = match CStr::from_ptr(name).to_bytes() {
+            b"vkGetDeviceProcAddr" => {
+                DEVICE_LOADER.set(transmute::<vk::PFN_vkVoidFunction, vk::PFN_vkGetDeviceProcAddr>(found));
+                get_device_proc_addr as *const c_void
+            }
+            b"vkGetPhysicalDeviceMemoryProperties" => {
+                MEMORY.set(transmute::<vk::PFN_vkVoidFunction, vk::PFN_vkGetPhysicalDeviceMemoryProperties>(found));
+                memory_properties as *const c_void
+            }
+            _ => return found,
+        };
+        Some(transmute::<*const c_void, unsafe extern "system" fn()>(ours))
+    }
+}
+
+static MEMORY: Real<vk::PFN_vkGetPhysicalDeviceMemoryProperties> = Real(Mutex::new(None));
+
+unsafe extern "system" fn memory_properties(
+    physical: vk::PhysicalDevice,
+    found: *mut vk::PhysicalDeviceMemoryProperties,
+) {
+    unsafe {
+        MEMORY.get()(physical, found);
+        if UNCACHED.load(SeqCst) {
+            (*found).memory_types.iter_mut().for_each(|of| of.property_flags &= !vk::MemoryPropertyFlags::HOST_CACHED);
         }
-        DEVICE_LOADER.set(transmute::<vk::PFN_vkVoidFunction, vk::PFN_vkGetDeviceProcAddr>(found));
-        Some(transmute::<*const c_void, unsafe extern "system" fn()>(get_device_proc_addr as *const c_void))
     }
 }
 

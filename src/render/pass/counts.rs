@@ -37,7 +37,7 @@ impl Counts {
     pub fn new(gpu: &Gpu, pixels: u32, thread_items: u32) -> Result<Self> {
         let (n, of_blocks) = (pixels as usize, block_count(pixels, thread_items) as usize);
         let offset = Buffer::new(gpu, "offset", n + 1, Location::Device)?;
-        offset.write_new(n, &[[0; 2]])?; // the number of all, which may be asked for before any is placed
+        offset.write(n, &[[0; 2]])?; // the number of all, which may be asked for before any is placed
         Ok(Self {
             priority: Buffer::new(gpu, "priority", n, Location::Device)?,
             weight: Buffer::new(gpu, "weight", n, Location::Device)?,
