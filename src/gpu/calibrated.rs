@@ -15,7 +15,7 @@ pub(super) enum CalibratedExtension {
 
 impl CalibratedExtension {
     /// The older one first: validation layers before 1.3.268 warn of the other on every device.
-    pub const BY_PREFERENCE: [Self; 2] = [Self::Ext, Self::Khr];
+    const BY_PREFERENCE: [Self; 2] = [Self::Ext, Self::Khr];
 
     /// As a device lists it.
     pub fn name(self) -> &'static CStr {
@@ -42,11 +42,15 @@ impl CalibratedExtension {
     }
 }
 
-/// The preferred one of those by which `physical` can read its own clock.
+/// The preferred one of those by which `physical` can read its own clock, and that `may_be` is true of.
 ///
 /// # Errors
 /// [`crate::error::Error::Device`] when memory is out.
-pub(super) fn offered(instance: &Instance, physical: vk::PhysicalDevice) -> Result<Option<CalibratedExtension>> {
+pub(super) fn offered(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    may_be: impl Fn(&CalibratedExtension) -> bool,
+) -> Result<Option<CalibratedExtension>> {
     // SAFETY: `physical` belongs to `instance`.
     let listed = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.at("device extensions")?;
     let is_usable = |extension: &CalibratedExtension| {
@@ -55,7 +59,7 @@ pub(super) fn offered(instance: &Instance, physical: vk::PhysicalDevice) -> Resu
         // SAFETY: a live instance.
         let query =
             unsafe { instance._entry.get_instance_proc_addr(instance.raw.handle(), extension.query().as_ptr()) };
-        is_listed && query.is_some()
+        is_listed && query.is_some() && may_be(extension)
     };
     for extension in CalibratedExtension::BY_PREFERENCE.into_iter().filter(is_usable) {
         // SAFETY: the device lists the extension, and the loader has its functions.

@@ -99,7 +99,7 @@ impl Gpu {
         let queue_family = usable(&candidate)?;
         let by_ray_query = is_by_ray_query(options.tracing, &candidate.info)?;
         let tuning = options.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).on(candidate.info.kind)?;
-        let calibrated = calibrated::offered(&instance, candidate.physical)?;
+        let calibrated = calibrated::offered(&instance, candidate.physical, |_| true)?;
         let alone = change_loader_lists();
         let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated, by_ray_query)?;
         let debug = instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device));

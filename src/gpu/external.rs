@@ -1,7 +1,7 @@
 //! Use of a device that an engine made. It is handed over as raw handles, so the engine can use other Vulkan bindings or
 //! another version of them.
 use super::Gpu;
-use super::calibrated::{CalibratedClock, CalibratedExtension};
+use super::calibrated::{self, CalibratedClock};
 use super::device::{Opened, is_by_ray_query, usable};
 use super::info;
 use super::instance::{Instance, walk_loader_lists};
@@ -49,7 +49,8 @@ pub struct RawDevice {
 
 impl Gpu {
     /// Uses a device made elsewhere and destroys only what it makes itself. [`Gpu::calibrate`] works if the device has
-    /// VK_KHR_calibrated_timestamps or VK_EXT_calibrated_timestamps enabled.
+    /// VK_KHR_calibrated_timestamps or VK_EXT_calibrated_timestamps enabled, and reads its own clock by it
+    /// (`VK_TIME_DOMAIN_DEVICE`).
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
@@ -83,39 +84,36 @@ impl Gpu {
             unsafe { std::mem::transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(raw.get_instance_proc_addr) };
         let table = ash::StaticFn { get_instance_proc_addr };
         // SAFETY: valid handles that belong together, by contract.
-        let (entry, instance) = unsafe {
-            (
-                ash::Entry::from_static_fn(table.clone()),
-                ash::Instance::load(&table, vk::Instance::from_raw(raw.instance)),
-            )
+        let instance = unsafe {
+            let loaded = ash::Instance::load(&table, vk::Instance::from_raw(raw.instance));
+            Instance::borrowed(ash::Entry::from_static_fn(table), loaded)
         };
         let unchanged = walk_loader_lists();
-        let device = unsafe { ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(raw.device)) };
+        let device = unsafe { ash::Device::load(instance.raw.fp_v1_0(), vk::Device::from_raw(raw.device)) };
         let physical = vk::PhysicalDevice::from_raw(raw.physical_device);
-        if !enabled(&instance, &device, &[c"vkCmdPipelineBarrier2"]) {
+        if !enabled(&instance.raw, &device, &[c"vkCmdPipelineBarrier2"]) {
             let what = "the instance was made for an older Vulkan: set apiVersion to 1.3 or newer";
             return Err(Error::Device(what.to_owned()));
         }
-        check_family(&instance, physical, raw.queue_family)?;
-        let mut candidate = info::describe(&instance, physical, Some(raw.queue_family));
+        check_family(&instance.raw, physical, raw.queue_family)?;
+        let mut candidate = info::describe(&instance.raw, physical, Some(raw.queue_family));
         candidate.info.robust_buffer_access = raw.robust_buffer_access;
         usable(&candidate)?;
         let labels = [c"vkCmdBeginDebugUtilsLabelEXT", c"vkCmdEndDebugUtilsLabelEXT", c"vkSetDebugUtilsObjectNameEXT"];
-        let has = |names: &[&CStr]| enabled(&instance, &device, names);
-        let debug = (raw.debug_utils && has(&labels)).then(|| ext::debug_utils::Device::new(&instance, &device));
-        let calibrated = CalibratedExtension::BY_PREFERENCE.into_iter().find(|extension| has(&[extension.function()]));
-        let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance, &device));
+        let has = |names: &[&CStr]| enabled(&instance.raw, &device, names);
+        let debug = (raw.debug_utils && has(&labels)).then(|| ext::debug_utils::Device::new(&instance.raw, &device));
+        let calibrated = calibrated::offered(&instance, physical, |extension| has(&[extension.function()]))?;
+        let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance.raw, &device));
         let by_ray_query = is_by_ray_query(raw.tracing, &candidate.info)?;
         if by_ray_query && !has(&[c"vkCreateAccelerationStructureKHR", c"vkCreateDeferredOperationKHR"]) {
             let what = "the device cannot trace by ray queries: make it with VK_KHR_ray_query, VK_KHR_acceleration_structure and \
                         VK_KHR_deferred_host_operations, and with rayQuery, accelerationStructure and bufferDeviceAddress";
             return Err(Error::Device(what.to_owned()));
         }
-        let ray_queries = by_ray_query.then(|| RayQueries::new(&instance, physical, &device));
+        let ray_queries = by_ray_query.then(|| RayQueries::new(&instance.raw, physical, &device));
         let tuning = raw.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).on(candidate.info.kind)?;
         drop(unchanged);
         let queue = vk::Queue::from_raw(raw.queue);
-        let instance = Instance::borrowed(entry, instance);
         let queue_family = raw.queue_family;
         let opened =
             Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };

@@ -1,10 +1,12 @@
 //! Tests the GPU layer with an engine's own instance, device and command buffer: it must give the same bits.
 #![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
+use crate::hooks;
 use crate::support;
 use crate::support::engine::Engine;
 use crate::support::kernels::next;
 use ash::vk;
 use ash::vk::Handle;
+use std::sync::atomic::Ordering::SeqCst;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, RawDevice, Recorder};
 
 /// Two dependent passes; returns the buffers in use, the result last.
@@ -80,6 +82,18 @@ fn an_engines_clocks_are_tied_together_where_its_device_can() {
         let after = gpu.calibrate().unwrap();
         assert!((after.device_ns - before.device_ns).abs_diff(after.host_ns - before.host_ns) < 5_000_000);
     }
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// The extension is there, and a clock of the device is not among those that it reads.
+#[test]
+fn a_clock_that_a_device_does_not_read_is_not_asked_for() {
+    let engine = Engine::new();
+    hooks::NO_DEVICE_CLOCK.store(true, SeqCst);
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    hooks::NO_DEVICE_CLOCK.store(false, SeqCst);
+    assert_eq!(gpu.calibrate(), None);
     assert_eq!(engine.messages(), Vec::<String>::new());
 }
 

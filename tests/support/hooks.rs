@@ -20,6 +20,9 @@ pub static WAIT: AtomicI32 = AtomicI32::new(0);
 /// While set, no memory that the host maps is cached, as on some integrated graphics cards: reading a buffer takes a copy.
 pub static UNCACHED: AtomicBool = AtomicBool::new(false);
 
+/// While set, no device reads its own clock by the extension for that, only the host's.
+pub static NO_DEVICE_CLOCK: AtomicBool = AtomicBool::new(false);
+
 /// Called before every wait for a fence.
 pub static BEFORE_WAIT: Mutex<Option<Box<dyn Fn() + Send>>> = Mutex::new(None);
 
@@ -104,10 +107,29 @@ unsafe extern "system" fn get_instance_proc_addr(
                 MEMORY.set(transmute::<vk::PFN_vkVoidFunction, vk::PFN_vkGetPhysicalDeviceMemoryProperties>(found));
                 memory_properties as *const c_void
             }
+            b"vkGetPhysicalDeviceCalibrateableTimeDomainsKHR" | b"vkGetPhysicalDeviceCalibrateableTimeDomainsEXT"
+                if found.is_some() && NO_DEVICE_CLOCK.load(SeqCst) =>
+            {
+                time_domains as *const c_void
+            }
             _ => return found,
         };
         Some(transmute::<*const c_void, unsafe extern "system" fn()>(ours))
     }
+}
+
+unsafe extern "system" fn time_domains(
+    _: vk::PhysicalDevice,
+    count: *mut u32,
+    domains: *mut vk::TimeDomainKHR,
+) -> vk::Result {
+    unsafe {
+        *count = 1;
+        if !domains.is_null() {
+            *domains = vk::TimeDomainKHR::CLOCK_MONOTONIC;
+        }
+    }
+    vk::Result::SUCCESS
 }
 
 static MEMORY: Real<vk::PFN_vkGetPhysicalDeviceMemoryProperties> = Real(Mutex::new(None));
