@@ -225,14 +225,14 @@ impl Timer {
 
     /// The last pass that began, for a message about a lost device. Most drivers still return the queries then.
     pub fn last_started(&self) -> Option<&'static str> {
-        let started = |index: &usize| matches!(self.query(2 * index), Ok([_, available]) if available != 0);
-        (0..self.passes.len()).rev().find(started).map(|index| self.passes[index])
+        let began = self.queries().ok()?.into_iter().step_by(2).rposition(|[_, available]| available != 0)?;
+        Some(self.passes[began])
     }
 
     /// Number of timestamps written so far. It grows as the work proceeds.
     pub fn written(&self) -> usize {
-        let there = |index: &usize| matches!(self.query(*index), Ok([_, available]) if available != 0);
-        (0..2 * self.passes.len()).filter(there).count()
+        let queries = self.queries().unwrap_or_default();
+        queries.iter().filter(|[_, available]| *available != 0).count()
     }
 
     /// Begin and end of every pass in ticks.
@@ -240,21 +240,25 @@ impl Timer {
     /// # Errors
     /// `NOT_READY` when one is not available yet, and those of Vulkan.
     fn ticks(&self) -> std::result::Result<Vec<[u64; 2]>, vk::Result> {
-        let read = |index| match self.query(index)? {
-            [_, 0] => Err(vk::Result::NOT_READY),
-            [ticks, _] => Ok(ticks),
-        };
-        (0..self.passes.len()).map(|pass| Ok([read(2 * pass)?, read(2 * pass + 1)?])).collect()
+        let queries = self.queries()?;
+        match queries.iter().all(|[_, available]| *available != 0) {
+            true => Ok(queries.chunks_exact(2).map(|pass| [pass[0][0], pass[1][0]]).collect()),
+            false => Err(vk::Result::NOT_READY),
+        }
     }
 
-    /// (ticks, availability) of one query; availability is 0 until the timestamp is written.
-    fn query(&self, index: usize) -> std::result::Result<[u64; 2], vk::Result> {
-        let (pool, query) = (self.pools[index / POOL as usize], (index % POOL as usize) as u32);
+    /// (ticks, availability) of every query; availability is 0 until the timestamp is written.
+    fn queries(&self) -> std::result::Result<Vec<[u64; 2]>, vk::Result> {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
-        let mut result = [[0u64; 2]];
-        // SAFETY: a live pool; the result has two words per query, as the flags say.
-        unsafe { self.gpu.0.device.get_query_pool_results(pool, query, &mut result, flags) }?;
-        Ok(result[0])
+        let mut queries = vec![[0; 2]; 2 * self.passes.len()];
+        for (pool, results) in self.pools.iter().zip(queries.chunks_mut(POOL as usize)) {
+            // SAFETY: a live pool; the results have two words per query, as the flags say.
+            match unsafe { self.gpu.0.device.get_query_pool_results(*pool, 0, results, flags) } {
+                Ok(()) | Err(vk::Result::NOT_READY) => {} // availabilities are written all the same
+                Err(code) => return Err(code),
+            }
+        }
+        Ok(queries)
     }
 }
 
