@@ -11,7 +11,8 @@ pub(crate) type Checked<T = ()> = std::result::Result<T, String>;
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An option or a setting out of range, alone or together with another.
+    /// An option or a setting out of range, alone or together with another; of [`gpu`](crate::gpu) and of what records also what does not
+    /// fit together, such as a range beyond a buffer, what was made on another device, or a call before its time.
     #[error("{0}")]
     Usage(String),
     /// A file that cannot be read, or does not hold what it should.
@@ -27,9 +28,8 @@ pub enum Error {
     /// A scene whose arrays were edited and no longer fit together.
     #[error("the scene's arrays do not fit together: {0}: edit all that an index leads to, or load the scene again")]
     Scene(String),
-    /// No Vulkan loader, no usable device, a missing feature, or more than the device's limits let it do; of [`gpu`](crate::gpu) also what
-    /// does not fit together, such as a range beyond a buffer, or what was made on another device. Where a function names this error, the
-    /// device may also be lost or out of memory.
+    /// No Vulkan loader, no usable device, a missing feature, or more than the device's limits let it do. Where a function names this error,
+    /// the device may also be lost or out of memory.
     #[error("{0}")]
     Device(String),
     /// The device is out of memory: what was asked for is not there, and what was made before is as it was.

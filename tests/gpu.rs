@@ -3,11 +3,19 @@ mod support;
 use std::process::Command;
 use support::kernels::{far, mix, next};
 use support::{assert_silent, hash, words};
+use tallow::error::{Error, Result};
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location, PassTime};
 use tallow::layout::{Effects, uvec2, uvec3, uvec4, vec4};
 
 const SIZES: [usize; 5] = [1, 31, 64, 65, 1_000_001];
 const WIDTH: u32 = 64;
+
+/// The message of an error about what a caller gave.
+fn refused<T>(given: Result<T>) -> String {
+    let error = given.err().unwrap();
+    assert!(matches!(error, Error::Usage(_)), "{error:?}");
+    error.to_string()
+}
 
 fn groups(count: usize) -> [u32; 3] {
     [(count as u32).div_ceil(WIDTH), 1, 1]
@@ -41,13 +49,16 @@ fn bad_sizes_are_errors_that_name_the_buffer() {
     let gpu = support::gpu();
     let buffer = Buffer::from_slice(&gpu, "small", &[1u32, 2, 3]).unwrap();
     for (offset, count) in [(3, 1), (0, 4), (usize::MAX, 1)] {
-        let message = buffer.write(offset, &vec![0; count]).unwrap_err().to_string();
+        let message = refused(buffer.write(offset, &vec![0; count]));
         assert!(message.contains("small"), "{message}");
     }
+    assert!(refused(buffer.read_range(2..4)).contains("small"));
     let other = Buffer::from_slice(&gpu, "other", &[1u32]).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    let message = gpu.run(&mut frame, |rec| rec.copy(&buffer, &other)).unwrap_err().to_string();
+    let message = refused(gpu.run(&mut frame, |rec| rec.copy(&buffer, &other)));
     assert!(message.contains("small") && message.contains("other"), "{message}");
+    let message = refused(gpu.run(&mut frame, |rec| rec.upload(&buffer, &[(2, &[1, 2])])));
+    assert!(message.contains("small"), "{message}");
     for len in [usize::MAX, 1 << 50] {
         let message = Buffer::<u32>::new(&gpu, "huge", len, Location::Device).err().unwrap().to_string();
         assert!(message.contains("huge"), "{message}");
@@ -239,10 +250,10 @@ fn bad_dispatches_are_errors_and_leave_the_frame_usable() {
     let mut frame = FrameResources::new(&gpu).unwrap();
     let kernel = next::Kernel::new(&gpu, &Default::default()).unwrap();
     let (a, b) = (Buffer::from_slice(&gpu, "a", &[1u32]).unwrap(), Buffer::from_slice(&gpu, "b", &[0u32]).unwrap());
-    for groups in [[0, 1, 1], [1, 1, 0], [1, u32::MAX, 1]] {
+    for (groups, kind) in [([0, 1, 1], 2), ([1, 1, 0], 2), ([1, u32::MAX, 1], 4)] {
         let run = gpu.run(&mut frame, |rec| rec.dispatch(&kernel, next::Bind { from: &a, to: &b }, &1, groups));
-        let message = run.unwrap_err().to_string();
-        assert!(message.starts_with("next: "), "{message}");
+        let error = run.unwrap_err();
+        assert!(error.to_string().starts_with("next: ") && error.exit_code() == kind, "{error:?}");
     }
     gpu.run(&mut frame, |rec| rec.dispatch(&kernel, next::Bind { from: &a, to: &b }, &1, [1; 3])).unwrap();
     assert_eq!(b.read().unwrap(), [4]);
@@ -337,10 +348,10 @@ fn a_part_is_bound_read_and_written_in_its_place() {
     };
     assert_eq!(all.read().unwrap(), (0..1000).map(expected).collect::<Vec<_>>());
     for range in [1..64, 64..64, 64..1001] {
-        assert!(all.part(range).err().unwrap().to_string().contains("\"all\""));
+        assert!(refused(all.part(range)).contains("\"all\""));
     }
     let texels = Buffer::<uvec4>::new(&gpu, "texels", 200, Location::Device).unwrap();
-    let message = fetch(&gpu, &texels.part(64..128).unwrap(), 0).unwrap_err().to_string();
+    let message = refused(fetch(&gpu, &texels.part(64..128).unwrap(), 0));
     assert!(message.contains("a part of it cannot be read as texels"), "{message}");
     assert_silent(&gpu);
 }
@@ -385,8 +396,8 @@ fn parts_of_another_device_are_refused() {
         gpu.run(&mut frame, |rec| rec.dispatch(kernel, next::Bind { from, to: &to }, &1, [1; 3])).map(|_| ())
     };
     let foreign = next::Kernel::new(&other, &Default::default()).unwrap();
-    for refused in [run(&other, &here, &kernel), run(&gpu, &there, &kernel), run(&gpu, &here, &foreign)] {
-        assert!(refused.unwrap_err().to_string().contains("another device"));
+    for run in [run(&other, &here, &kernel), run(&gpu, &there, &kernel), run(&gpu, &here, &foreign)] {
+        assert!(refused(run).contains("another device"));
     }
     run(&gpu, &here, &kernel).unwrap();
     assert_silent(&gpu);

@@ -32,9 +32,9 @@ impl Denoiser {
     /// runs for once more.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings out of range, for a renderer without what the filter needs, and for one with an
+    /// [`Error::Usage`] for settings out of range, for a renderer without what the filter needs or of another device, and for one with an
     /// `indirect_stride` without [`Demodulation::Light`]; [`Error::Device`] when the film is too large for the
-    /// device's bindings, or `renderer` was made on another device.
+    /// device's bindings.
     pub fn new(
         gpu: &Gpu,
         renderer: &Renderer,

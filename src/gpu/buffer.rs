@@ -125,7 +125,7 @@ impl<T: Pod> Buffer<T> {
     /// must begin at a multiple of [`PART`].
     ///
     /// # Errors
-    /// [`Error::Device`] when there is no such part.
+    /// [`Error::Usage`] when there is no such part.
     pub fn part(&self, range: Range<usize>) -> Result<Self> {
         if !range.start.is_multiple_of(PART) || range.is_empty() || range.end > self.len {
             return Err(self.no_part(&range));
@@ -188,7 +188,7 @@ impl<T: Pod> Buffer<T> {
     /// with [`super::Recorder::external`], see its safety section.
     ///
     /// # Errors
-    /// [`Error::Device`] when they do not fit, or the copy fails.
+    /// [`Error::Usage`] when they do not fit, [`Error::Device`] when the copy fails.
     pub fn write(&self, offset: usize, values: &[T]) -> Result<()> {
         self.untyped.write(self.place(offset, values.len())?, bytemuck::cast_slice(values))
     }
@@ -197,7 +197,7 @@ impl<T: Pod> Buffer<T> {
     fn place(&self, offset: usize, count: usize) -> Result<usize> {
         if offset.checked_add(count).is_none_or(|end| end > self.len) {
             let (name, len) = (&self.untyped.name, self.len);
-            return Err(Error::Device(format!("buffer \"{name}\": {count} elements at {offset} exceed its {len}")));
+            return Err(Error::Usage(format!("buffer \"{name}\": {count} elements at {offset} exceed its {len}")));
         }
         Ok((self.first + offset) * size_of::<T>())
     }
@@ -214,7 +214,7 @@ impl<T: Pod> Buffer<T> {
     /// Returns the elements in `range`; otherwise as [`Self::read`].
     ///
     /// # Errors
-    /// [`Error::Device`] when the range exceeds the buffer, or the copy fails.
+    /// [`Error::Usage`] when the range exceeds the buffer, [`Error::Device`] when the copy fails.
     pub fn read_range(&self, range: Range<usize>) -> Result<Vec<T>> {
         if range.start > range.end || range.end > self.len {
             return Err(self.no_part(&range));
@@ -231,7 +231,7 @@ impl<T: Pod> Buffer<T> {
 
     fn no_part(&self, range: &Range<usize>) -> Error {
         let (name, len) = (&self.untyped.name, self.len);
-        Error::Device(format!("buffer \"{name}\": {range:?} is no part of its {len} elements"))
+        Error::Usage(format!("buffer \"{name}\": {range:?} is no part of its {len} elements"))
     }
 
     /// The Vulkan buffer behind this one. It lives as long as this handle or a clone of it.
@@ -279,7 +279,7 @@ impl Bound<'_> {
     pub(super) fn texels(&self, floats: bool) -> Result<vk::BufferView> {
         let whole = &**self.buffer;
         if self.offset > 0 || self.size.next_multiple_of(whole.texel) < whole.size {
-            return Err(Error::Device(format!("buffer \"{}\": a part of it cannot be read as texels", whole.name)));
+            return Err(Error::Usage(format!("buffer \"{}\": a part of it cannot be read as texels", whole.name)));
         }
         let format = match (floats, whole.texel) {
             (true, 16) => vk::Format::R32G32B32A32_SFLOAT,

@@ -11,8 +11,8 @@ impl Recorder<'_> {
     /// What was built before is overwritten, after passes that read it. Memory that only the builds need goes with the frame.
     ///
     /// # Errors
-    /// [`Error::Device`] when there are more copies than there is room for, a mesh of theirs begins beyond triangle 2^24, or memory
-    /// is out.
+    /// [`Error::Usage`] when there are more copies than there is room for, [`Error::Device`] when a mesh of theirs begins beyond triangle
+    /// 2^24, or memory is out.
     pub(crate) fn build(
         &mut self,
         acceleration: &Acceleration,
@@ -25,7 +25,7 @@ impl Recorder<'_> {
         shapes.check(&gpu, &acceleration.meshes)?;
         if copies.len() > acceleration.records.len() {
             let (count, room) = (copies.len(), acceleration.records.len());
-            return Err(Error::Device(format!("{count} copies of meshes, and there is room for {room}")));
+            return Err(Error::Usage(format!("{count} copies of meshes, and there is room for {room}")));
         }
         if !meshes.is_empty() {
             let inputs = meshes.iter().map(|&mesh| Input::of_mesh(&gpu, shapes, &acceleration.meshes[mesh])).collect();

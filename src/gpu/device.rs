@@ -189,11 +189,11 @@ impl Gpu {
     }
 
     /// # Errors
-    /// When `what` was made on another device, where its handles are not valid.
+    /// [`Error::Usage`] when `what` was made on another device, where its handles are not valid.
     pub(crate) fn owns(&self, what: &str, maker: &Gpu) -> Result<()> {
         match Arc::ptr_eq(&self.0, &maker.0) {
             true => Ok(()),
-            false => Err(Error::Device(format!("{what} was made on another device: make it on the one that runs it"))),
+            false => Err(Error::Usage(format!("{what} was made on another device: make it on the one that runs it"))),
         }
     }
 

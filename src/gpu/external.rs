@@ -74,8 +74,8 @@ impl Gpu {
     ///   Otherwise kernels might read and write outside their buffers.
     ///
     /// # Errors
-    /// [`Error::Device`] when a handle is null, the device cannot do what is required, or the family cannot compute.
-    /// [`Error::Usage`] for a tuning that cannot be.
+    /// [`Error::Usage`] when a handle is null, the family does not exist or cannot compute, and for a tuning that cannot be.
+    /// [`Error::Device`] when the device cannot do what is required.
     pub unsafe fn from_raw(raw: RawDevice) -> Result<Self> {
         check_handles(&raw)?;
         // SAFETY: a valid `vkGetInstanceProcAddr` by contract; function pointers have the size of data pointers on
@@ -131,7 +131,7 @@ fn check_handles(raw: &RawDevice) -> Result<()> {
     ];
     match handles.iter().find(|(_, handle)| *handle == 0) {
         Some((field, _)) => {
-            Err(Error::Device(format!("a null handle was handed over: give RawDevice::{field} that of your engine")))
+            Err(Error::Usage(format!("a null handle was handed over: give RawDevice::{field} that of your engine")))
         }
         None => Ok(()),
     }
@@ -142,8 +142,8 @@ fn check_family(instance: &ash::Instance, physical: vk::PhysicalDevice, family: 
     let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
     match families.get(family as usize) {
         Some(f) if f.queue_flags.contains(vk::QueueFlags::COMPUTE) => Ok(()),
-        Some(_) => Err(Error::Device(format!("queue family {family} has no compute: hand over one that has"))),
-        None => Err(Error::Device(format!("queue family {family} does not exist: there are {}", families.len()))),
+        Some(_) => Err(Error::Usage(format!("queue family {family} has no compute: hand over one that has"))),
+        None => Err(Error::Usage(format!("queue family {family} does not exist: there are {}", families.len()))),
     }
 }
 

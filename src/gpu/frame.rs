@@ -50,7 +50,7 @@ impl FrameResources {
     /// after a [`Gpu::run`] that failed.
     ///
     /// # Errors
-    /// [`Error::Device`](crate::error::Error::Device) when that work is not complete,
+    /// [`Error::Usage`](crate::error::Error::Usage) when that work is not complete,
     /// [`Error::DeviceLost`](crate::error::Error::DeviceLost) when the device was lost: nothing on it works from then on.
     pub fn times(&self) -> Result<Vec<PassTime>> {
         self.timer.times()

@@ -80,10 +80,10 @@ impl<'a> Recorder<'a> {
     /// - The recorder is dropped before the command buffer is ended.
     ///
     /// # Errors
-    /// [`Error::Device`] when the handle is null or the device is out of memory.
+    /// [`Error::Usage`] when the handle is null, [`Error::Device`] when the device is out of memory.
     pub unsafe fn external(gpu: &'a Gpu, frame: &'a mut FrameResources, command_buffer: u64) -> Result<Self> {
         if command_buffer == 0 {
-            return Err(Error::Device("a null command buffer was handed over".into()));
+            return Err(Error::Usage("a null command buffer was handed over".into()));
         }
         gpu.owns("the frame", frame.gpu())?;
         frame.reset()?;
@@ -113,8 +113,8 @@ impl<'a> Recorder<'a> {
     /// Runs `kernel` on the buffers in `bind` with `groups` workgroups along x, y and z.
     ///
     /// # Errors
-    /// [`Error::Device`] when a group count is 0 or over the device's limit, a buffer is too large for its slot, or
-    /// memory is out.
+    /// [`Error::Usage`] when a group count is 0, [`Error::Device`] when one is over the device's limit, a buffer is too large for
+    /// its slot, or memory is out.
     pub fn dispatch<B: Bindings>(
         &mut self,
         kernel: &Kernel<B>,
@@ -163,7 +163,7 @@ impl<'a> Recorder<'a> {
         world: Option<&'b Acceleration>,
     ) -> Result<Option<(u32, &'b Arc<Handles>)>> {
         let Some(binding) = kernel.world else { return Ok(None) };
-        let none = || Error::Device(format!("{}: the scene has no acceleration structures", kernel.name));
+        let none = || Error::Usage(format!("{}: the scene has no acceleration structures", kernel.name));
         let handles = &world.ok_or_else(none)?.handles;
         self.gpu.owns("the acceleration structures", &handles.gpu)?;
         self.frame.keep_structures(handles);
@@ -173,16 +173,14 @@ impl<'a> Recorder<'a> {
     /// Copies all of `src` over `dst`, which has the same length.
     ///
     /// # Errors
-    /// [`Error::Device`] when the lengths differ, both are one buffer, or memory is out.
+    /// [`Error::Usage`] when the lengths differ or both are one buffer, [`Error::Device`] when memory is out.
     pub fn copy<T: Pod>(&mut self, src: &Buffer<T>, dst: &Buffer<T>) -> Result<()> {
         let [source, target] = [src.bound(), dst.bound()];
         let (from, to) = (source.buffer, target.buffer);
         if src.len() != dst.len() || Arc::ptr_eq(from, to) {
             let (from, to, m, n) = (&from.name, &to.name, src.len(), dst.len());
             let why = "give two buffers of one length";
-            return Err(Error::Device(format!(
-                "\"{from}\" of {m} elements cannot be copied to \"{to}\" of {n}: {why}"
-            )));
+            return Err(Error::Usage(format!("\"{from}\" of {m} elements cannot be copied to \"{to}\" of {n}: {why}")));
         }
         self.owns(&[source, target])?;
         let region = [vk::BufferCopy { src_offset: source.offset, dst_offset: target.offset, size: source.size }];
@@ -242,12 +240,12 @@ impl<'a> Recorder<'a> {
     /// one call may not overlap.
     ///
     /// # Errors
-    /// [`Error::Device`] when a part exceeds the buffer, or memory is out.
+    /// [`Error::Usage`] when a part exceeds the buffer, [`Error::Device`] when memory is out.
     pub fn upload<T: Pod>(&mut self, buffer: &Buffer<T>, parts: &[(usize, &[T])]) -> Result<()> {
         let parts: Vec<_> = parts.iter().filter(|(_, values)| !values.is_empty()).collect();
         if let Some((at, values)) = parts.iter().find(|(at, v)| at.saturating_add(v.len()) > buffer.len()) {
             let (name, count, len) = (&buffer.bound().buffer.name, values.len(), buffer.len());
-            return Err(Error::Device(format!("buffer \"{name}\": {count} elements at {at} exceed its {len}")));
+            return Err(Error::Usage(format!("buffer \"{name}\": {count} elements at {at} exceed its {len}")));
         }
         if parts.is_empty() {
             return Ok(());
@@ -283,7 +281,7 @@ impl<'a> Recorder<'a> {
         buffers.iter().try_for_each(|bound| self.gpu.owns(&bound.buffer.name, &bound.buffer.gpu))
     }
 
-    pub(super) fn gpu(&self) -> &Gpu {
+    pub(crate) fn gpu(&self) -> &Gpu {
         self.gpu
     }
 
@@ -343,7 +341,7 @@ impl Drop for Recorder<'_> {
 
 fn check_groups(name: &str, groups: [u32; 3], limit: [u32; 3]) -> Result<()> {
     if groups.contains(&0) {
-        return Err(Error::Device(format!("{name}: an empty dispatch of {groups:?} workgroups")));
+        return Err(Error::Usage(format!("{name}: an empty dispatch of {groups:?} workgroups")));
     }
     if groups.iter().zip(limit).any(|(count, most)| *count > most) {
         let what = format!("{name}: {groups:?} workgroups are over the device's limit of {limit:?}");

@@ -212,7 +212,7 @@ impl Timer {
         let clock = Clock::of(&self.gpu);
         let ticks = self.ticks().map_err(|code| match code {
             vk::Result::NOT_READY => {
-                Error::Device("the times of a frame were asked for before its work was complete: wait for it".into())
+                Error::Usage("the times of a frame were asked for before its work was complete: wait for it".into())
             }
             code => {
                 self.gpu.0.note_loss(code);

@@ -218,9 +218,10 @@ impl Renderer {
     /// Records one step.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for a step that this renderer has no room for and after [`Renderer::update`] has failed on the device,
+    /// [`crate::error::Error::Usage`] for a recorder of another device, a step that this renderer has no room for, and after [`Renderer::update`] has failed on the device,
     /// [`crate::error::Error::Device`]. Other steps of another renderer are not told apart and make a wrong picture.
     pub fn record(&self, rec: &mut Recorder, step: &Step) -> Result<()> {
+        rec.gpu().owns("the renderer", &self.gpu)?;
         self.serial.ok_or_else(half_updated)?;
         if !self.cut().has_room_for(step) {
             return Err(Error::Usage(format!("{step:?} is of another renderer: take those of Renderer::steps")));

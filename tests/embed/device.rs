@@ -107,7 +107,8 @@ fn times_before_the_work_is_done_are_an_error() {
         let mut rec = unsafe { Recorder::external(&gpu, &mut frame, commands.as_raw()) }.unwrap();
         record(&mut rec, &kernel, &buffers);
         drop(rec);
-        assert!(frame.times().unwrap_err().to_string().contains("before its work was complete"));
+        let error = frame.times().unwrap_err();
+        assert!(error.to_string().contains("before its work was complete") && error.exit_code() == 2, "{error:?}");
     });
     assert_eq!(frame.times().unwrap().len(), 2);
     assert_eq!(engine.messages(), Vec::<String>::new());
@@ -121,12 +122,12 @@ fn bad_handles_are_errors() {
         (RawDevice { get_instance_proc_addr: std::ptr::null(), ..engine.raw() }, "RawDevice::get_instance_proc_addr "),
         (RawDevice { queue_family: 99, ..engine.raw() }, "99"),
     ] {
-        let message = unsafe { Gpu::from_raw(bad) }.err().unwrap().to_string();
-        assert!(message.contains(part), "{message}");
+        let error = unsafe { Gpu::from_raw(bad) }.err().unwrap();
+        assert!(error.to_string().contains(part) && error.exit_code() == 2, "{error:?}");
     }
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    assert!(unsafe { Recorder::external(&gpu, &mut frame, 0) }.is_err());
+    assert_eq!(unsafe { Recorder::external(&gpu, &mut frame, 0) }.err().unwrap().exit_code(), 2);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::{self, Film, Samples, WriteOptions};
 use tallow::layout::Camera;
 use tallow::render::settings::Settings;
-use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, StopReason, merge, traces_paths};
+use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, Step, StopReason, merge, traces_paths};
 use tallow::scene::{Change, Loaded, Scene};
 
 fn scene(change: impl Fn(&mut Settings)) -> Loaded {
@@ -107,10 +107,16 @@ fn an_update_that_is_refused_leaves_what_a_film_says() {
     let status = Job::new(&renderer).run_to_end(&mut frame).unwrap();
     let said = |renderer: &Renderer| Job::new(renderer).film(&status).unwrap().metadata;
     let before = said(&renderer);
-    scene.scene.view.fov = Some(200.0);
+    let fov = scene.scene.view.fov.replace(200.0);
     let change = Change::everything(&scene);
     assert!(gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change)).is_err());
     assert_eq!(said(&renderer), before);
+    scene.scene.view.fov = fov;
+    let other = crate::support::gpu();
+    let foreign = other.run(&mut FrameResources::new(&other).unwrap(), |rec| renderer.update(rec, &scene, &change));
+    let error = foreign.unwrap_err();
+    assert!(error.exit_code() == 2 && error.to_string().contains("the renderer was made on another device"), "{error}");
+    assert!(said(&renderer) == before && renderer.run(&mut frame, &Step::Start).is_ok());
     assert_silent(&gpu);
 }
 

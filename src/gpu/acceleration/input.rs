@@ -26,7 +26,7 @@ impl<'a> Shapes<'a> {
     /// Triangles whose `corners` are so many bytes from the start of a record, and beside each a box or none.
     ///
     /// # Errors
-    /// [`Error::Device`] where the corners of all records do not follow each other at equal distances.
+    /// [`Error::Usage`] where the corners of all records do not follow each other at equal distances.
     pub fn new<T: Pod>(triangles: &'a Buffer<T>, corners: [usize; 3], boxes: Option<&'a Buffer<Aabb>>) -> Result<Self> {
         let (size, stride) = (size_of::<T>(), size_of::<T>() / 3);
         let even = size == 3 * stride && corners.windows(2).all(|pair| pair[1] == pair[0] + stride);
@@ -34,7 +34,7 @@ impl<'a> Shapes<'a> {
         let what = "ray queries need records of triangles that have their corners at equal distances";
         match even {
             true => Ok(Self { triangles: triangles.bound(), corner, stride, boxes: boxes.map(Buffer::bound) }),
-            false => Err(Error::Device(what.into())),
+            false => Err(Error::Usage(what.into())),
         }
     }
 
@@ -43,18 +43,18 @@ impl<'a> Shapes<'a> {
     }
 
     /// # Errors
-    /// [`Error::Device`] where there are fewer of them than meshes have, or `gpu` cannot build of them.
+    /// [`Error::Usage`] where there are fewer of them than meshes have, or `gpu` cannot build of them.
     pub(in crate::gpu) fn check(&self, gpu: &Gpu, meshes: &[Mesh]) -> Result<()> {
         for Bound { buffer, .. } in self.buffers() {
             gpu.owns(&buffer.name, &buffer.gpu)?;
             if buffer.location != Location::Device {
-                return Err(Error::Device(format!("buffer \"{}\": ray queries need it in device memory", buffer.name)));
+                return Err(Error::Usage(format!("buffer \"{}\": ray queries need it in device memory", buffer.name)));
             }
         }
         let boxes = self.boxes.map_or(u64::MAX, |boxes| boxes.size / size_of::<Aabb>() as u64);
         let count = boxes.min(self.triangles.size / (3 * self.stride));
         match meshes.iter().map(|mesh| mesh.range.end as u64).max().filter(|end| *end > count) {
-            Some(end) => Err(Error::Device(format!("a mesh ends at triangle {end}, and there are {count}"))),
+            Some(end) => Err(Error::Usage(format!("a mesh ends at triangle {end}, and there are {count}"))),
             None => Ok(()),
         }
     }
