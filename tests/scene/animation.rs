@@ -347,8 +347,13 @@ fn numbers_of_keys_are_checked_when_the_scene_is_loaded() {
     };
     let (grey, bulb, moved) = ("material = \"grey\"", "light = \"bulb\"", "instance = \"box\"");
     let sound = |tables: &str| {
-        tables.replace("-1", "1").replace("200e12", "20").replace("200000000000000", "20").replace("200", "20")
+        let tables = tables.replace("-1", "1").replace("200e12", "20").replace("200000000000000", "20");
+        tables.replace("200", "20").replace("1e300", "1")
     };
+    // A sphere with a placement of its own, by which that of a key is multiplied.
+    let egg = "[[mesh]]\nname = \"egg\"\nshape = \"sphere\"\ntransform = { scale = [1e10, 2e10, 1e10] }\n\
+               [[instance]]\nname = \"egg\"\nmesh = \"egg\"\ntransform = { scale = 0.1 }\n"
+        .to_owned();
     // What is too small to be seen reaches nowhere.
     assert!(
         Scene::parse(
@@ -367,6 +372,10 @@ fn numbers_of_keys_are_checked_when_the_scene_is_loaded() {
         (
             table(moved, "{ time = 0, translate = [1, 2, 3] }, { time = 2.5, translate = [0, 200e12, 0] }"),
             "instance 0 would reach beyond the limit of 1e12",
+        ),
+        (
+            egg + &table("instance = \"egg\"", "{ time = 0, scale = 1 }, { time = 2.5, scale = 1e300 }"),
+            "instance 1 gets a transform with NaN or infinite numbers",
         ),
     ] {
         let line = error(&tables);

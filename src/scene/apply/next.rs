@@ -135,10 +135,7 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
         if copy == NONE {
             return Err(format!("instance {number} is fixed: it has no triangles"));
         }
-        let affine = placed_by(scene, copy, transform);
-        if !affine.is_finite() {
-            return Err(format!("instance {number} gets a transform with NaN or infinite numbers"));
-        }
+        let affine = placed_by(scene, *number, copy, transform)?;
         if !Transform::from(affine).has_inverse() {
             flat.insert(copy);
             continue;
@@ -164,14 +161,18 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
 }
 
 /// Where a transform puts a copy, which may be moved within what is placed.
-fn placed_by(scene: &Scene, copy: u32, transform: &Transform) -> DAffine3 {
-    scene.rig.own.get(&copy).map_or(transform.0, |own| transform.0 * *own)
+fn placed_by(scene: &Scene, number: usize, copy: u32, transform: &Transform) -> Checked<DAffine3> {
+    let affine = scene.rig.own.get(&copy).map_or(transform.0, |own| transform.0 * *own);
+    match affine.is_finite() {
+        true => Ok(affine),
+        false => Err(format!("instance {number} gets a transform with NaN or infinite numbers")),
+    }
 }
 
 /// Checks that what is placed stays within the limit of coordinates, whatever else moves. What is not placed or not seen reaches nowhere.
 fn stays_within(scene: &Scene, number: usize, transform: &Transform) -> Checked {
     let Some(&copy) = scene.rig.placed.get(number).filter(|copy| **copy != NONE) else { return Ok(()) };
-    let affine = placed_by(scene, copy, transform);
+    let affine = placed_by(scene, number, copy, transform)?;
     if !Transform::from(affine).has_inverse() {
         return Ok(());
     }
