@@ -238,7 +238,10 @@ impl Film {
         }
         let wanted = layer.map_or("no colour (R, G, B)".to_owned(), |name| format!("no single layer {name:?}"));
         let names: Vec<_> = self.channels.iter().map(|c| c.name.as_str()).collect();
-        format!("holds {wanted}; its channels are {}", names.join(", "))
+        match names.is_empty() {
+            true => format!("holds {wanted}, nor any other channel"),
+            false => format!("holds {wanted}; its channels are {}", names.join(", ")),
+        }
     }
 
     fn colour(&self) -> Option<[&Channel; 3]> {

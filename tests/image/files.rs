@@ -502,6 +502,15 @@ mod replaced {
     }
 }
 
+#[test]
+fn a_film_without_channels_is_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.exr", "a.png", "a.hdr"] {
+        let what = what(image::write(&folder.path().join(name), &Film::new(2, 2), &WriteOptions::default()));
+        assert!(what.contains("channel") && what.ends_with(|end: char| end.is_alphabetic()), "{what:?}");
+    }
+}
+
 /// Fields are public: a channel may have any length.
 #[test]
 fn a_channel_of_another_length_is_no_file() {
