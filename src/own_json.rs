@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 
 /// A kind of such files.
 pub(crate) struct OwnJson {
-    /// What they are, with an article, and what writes them.
+    /// What they are, without an article, and what writes them.
     pub what: &'static str,
     /// The key that has the version of their format.
     pub version: &'static str,
@@ -35,8 +35,9 @@ impl OwnJson {
         })?;
         let found = value.get(version).and_then(Value::as_u64).ok_or_else(is_other)?;
         if !versions.contains(&found) {
-            let known = versions.end();
-            return Err(format!("is of version {found}, where this program knows version {known}: {remedy}"));
+            let (first, last) = (versions.start(), versions.end());
+            let known = if first == last { format!("version {last}") } else { format!("versions {first} to {last}") };
+            return Err(format!("is of version {found}, where this program reads {known}: {remedy}"));
         }
         drop(value);
         // By its text, so that the line is told.
@@ -61,7 +62,7 @@ mod tests {
         let kept = OwnJson { what: "list of jobs", version: "schema", versions: 1..=2, remedy: "list them again" };
         let other = "is no list of jobs";
         let part = "ends before it is complete: list them again";
-        let version = "is of version 3, where this program knows version 2: list them again";
+        let version = "is of version 3, where this program reads versions 1 to 2: list them again";
         for (text, told) in [
             ("", "is empty, and no list of jobs: list them again"),
             ("\u{feff} \n", "is empty, and no list of jobs: list them again"),

@@ -85,7 +85,7 @@ pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
 }
 
 fn rows(path: &Path, text: &[u8]) -> Result<Vec<Row>> {
-    let mut reader = csv::Reader::from_reader(text);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
     let at = |line: u64, what: String| Error::input_at(path, format!("line {line}"), what);
     let damaged = |e: csv::Error| at(e.position().map_or(1, csv::Position::line), words_of(&e));
     let names = reader.headers().map_err(damaged)?.clone();
@@ -185,6 +185,8 @@ mod tests {
         let labels: Vec<_> = runs.iter().map(|run| run.method.label()).collect();
         assert_eq!(labels, ["Other, 4 spp", "Other + oidn, 4 spp"]);
         assert_eq!((runs[0].seed, runs[0].ms, &runs[0].image), (7, 12.5, &PathBuf::from("a/b.exr")));
+        let spaced = table(&format!("\u{feff}{}", TABLE.replace(',', " , "))).unwrap();
+        assert_eq!(format!("{spaced:?}"), format!("{runs:?}"), "spaces and a byte order mark");
     }
 
     #[test]

@@ -17,7 +17,10 @@ pub fn open(path: &Path) -> Result<File> {
         kind if kind.is_file() => {
             let mut file = File::open(path).map_err(about)?;
             if begins_with(&mut file, POINTER).map_err(about)? {
-                return Err(Error::input(path, "is a pointer of Git LFS in place of the file: run git lfs pull there"));
+                return Err(Error::input(
+                    path,
+                    "is a pointer of Git LFS in place of the file: run git lfs pull in its repository",
+                ));
             }
             Ok(file)
         }
@@ -29,7 +32,7 @@ pub fn open(path: &Path) -> Result<File> {
 /// What stands in a repository for a file that Git LFS keeps elsewhere. Read as the buffer of a glTF file it would be a mesh.
 const POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
 
-/// Whether a file does. It is read from its first byte afterwards.
+/// Whether a file begins with these bytes. It is read from its first byte afterwards.
 fn begins_with(file: &mut File, beginning: &[u8]) -> std::io::Result<bool> {
     let mut head = Vec::new();
     file.take(beginning.len() as u64).read_to_end(&mut head)?;
@@ -82,13 +85,13 @@ pub fn holds_integers(path: &Path) -> bool {
     head_of(path).is_ok_and(|head| !super::holds_floats(&head))
 }
 
-fn head_of(path: &Path) -> std::io::Result<Vec<u8>> {
-    head(&mut File::open(path)?)
+fn head_of(path: &Path) -> Result<Vec<u8>> {
+    head(path, &mut open(path)?)
 }
 
-fn head(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
+fn head(path: &Path, file: &mut impl Read) -> Result<Vec<u8>> {
     let mut head = Vec::new();
-    file.take(HEAD as u64).read_to_end(&mut head)?;
+    file.take(HEAD as u64).read_to_end(&mut head).map_err(|e| Error::input(path, remedy(&e)))?;
     Ok(head)
 }
 
@@ -98,7 +101,7 @@ fn head(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
 /// As [`read`], and for a file of another kind.
 pub fn read_image(path: &Path) -> Result<Vec<u8>> {
     let mut file = open(path)?;
-    let head = not_empty(path, head(&mut file).map_err(|e| Error::input(path, remedy(&e)))?)?;
+    let head = not_empty(path, head(path, &mut file)?)?;
     match super::is_image(&head) {
         true => read_rest(path, file, head, 1),
         false => Err(Error::input(path, NO_IMAGE)),

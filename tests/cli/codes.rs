@@ -140,12 +140,19 @@ fn files_without_what_they_are_to_hold_are_told() {
     let pointer = format!("version https://git-lfs.github.com/spec/v1\noid sha256:{}\nsize 42\n", "0".repeat(64));
     for (text, told) in [
         ("", "is empty: take another copy of it"),
-        (&pointer, "is a pointer of Git LFS in place of the file: run git lfs pull there"),
+        (&pointer, "is a pointer of Git LFS in place of the file: run git lfs pull in its repository"),
     ] {
         check_files_that_hold(text, told);
     }
+    // A picture of a format that is not read is passed over with a warning; a pointer to one is told as that.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.tga"), pointer).unwrap();
+    let text = "[[material]]\nname = 'a'\ncolor_texture = 'a.tga'\n[[mesh]]\nshape = 'cube'\nmaterial = 'a'\n";
+    std::fs::write(folder.path().join("a.toml"), text).unwrap();
+    complains(&tallow(&folder, &["render", "a.toml", "-o", "b.exr"]), 3, &["a.tga: is a pointer of Git LFS"]);
 }
 
+/// Every kind of input that holds this text is refused for it, by its own name.
 fn check_files_that_hold(text: &str, told: &str) {
     let folder = tempfile::tempdir().unwrap();
     write(&folder, "a.exr", 12, 0.5);

@@ -373,7 +373,7 @@ fn what_cannot_be_measured_is_one_line() {
     let newer = folder.path().join("newer/cost.json");
     std::fs::write(&newer, "{\"schema\": 99}").unwrap();
     let version =
-        "newer/cost.json: is of version 99, where this program knows version 1: remove it to measure anew, or";
+        "newer/cost.json: is of version 99, where this program reads version 1: remove it to measure anew, or";
     complains(&cost(&folder, "-o newer"), 3, &[version]);
     assert_eq!(std::fs::read(&newer).unwrap(), b"{\"schema\": 99}");
     // As a full disk leaves it.

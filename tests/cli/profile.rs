@@ -181,7 +181,7 @@ fn bad_profiles_and_options_are_one_line() {
     std::fs::write(folder.path().join("list.json"), "[1, 2]").unwrap();
     std::fs::write(folder.path().join("empty.json"), "{\"schema\": 1}").unwrap();
     complains(&run(&["half.json"]), 3, &["half.json: ends before it is complete: profile again"]);
-    complains(&run(&[BOX, "--compare", "newer.json"]), 3, &["newer.json: is of version 2", "knows version 1: profile"]);
+    complains(&run(&[BOX, "--compare", "newer.json"]), 3, &["newer.json: is of version 2", "reads version 1: profile"]);
     complains(
         &run(&[BOX, "--compare", "list.json"]),
         3,

@@ -66,12 +66,11 @@ impl Preview {
         let partial = partial_name(path);
         files.go_on(&partial, partial.clone());
         let written = [files.save(&items, whole), files.pipe(&items, whole)].concat();
-        files.check()?;
-        if whole {
+        if whole && files.check().is_ok() {
             files.remove_partial(&items);
         }
         files.end();
-        Ok(written)
+        files.check().map(|()| written)
     }
 
     fn encode(&self, bytes: &mut Vec<u8>, fps: f64) -> std::result::Result<(), ::image::ImageError> {

@@ -160,9 +160,9 @@ fn bare_path(text: &str, at: usize) -> Option<(String, &str)> {
         return None;
     }
     // 5.f and 1.e5 are meant as numbers.
-    let is_ending = ending.len() > 1 && ending.chars().all(char::is_alphanumeric);
-    let is_number = |text: &str| text.chars().all(|c| c.is_ascii_digit());
-    let is_path = is_ending && !ending.starts_with(|c: char| c.is_ascii_digit()) && !is_number(&ending[1..]);
+    let is_ending = ending.chars().count() > 1 && ending.chars().all(char::is_alphanumeric);
+    let is_number = ending.chars().skip(1).all(|c| c.is_ascii_digit());
+    let is_path = is_ending && !ending.starts_with(|c: char| c.is_ascii_digit()) && !is_number;
     is_path.then_some((key_before(text, from)?, value))
 }
 
@@ -356,7 +356,17 @@ mod tests {
         let numbers =
             ["3d.obj", "2nd room.obj", "1.obj", "1e5.png", "3.5.obj", "01.png", "0x1.png", "0b1.obj", "inf.png"];
         let dates = ["2024-01-01.png", "2024-13-01.png", "10:30:00.png", "12:30.obj", "2024-01-01T00:00:00.png"];
-        let others = ["a.obj", ".png", "../a.obj", "a b.png", "true.png", "/tmp/a.obj"];
+        let others = [
+            "a.obj",
+            ".png",
+            "../a.obj",
+            "a b.png",
+            "true.png",
+            "/tmp/a.obj",
+            "a.\u{f6}bj",
+            "a.\u{e9}t",
+            "b.\u{578b}\u{578b}",
+        ];
         for name in numbers.into_iter().chain(dates).chain(others) {
             let told = format!("line 2: file takes a text in quotes: \"{name}\"");
             ends(&format!("[[mesh]]\nfile = {name}"), &told);
