@@ -270,7 +270,7 @@ float bsdf_share(Bsdf b, vec3 wo, float u_lobe) {
     return chance < 0.5 ? 0.0 : chance;
 }
 
-const float LEAST_TINT = 0.1;
+const float LEAST_TINT = 0.3;
 
 // The albedo that a path of this `throughput` keeps of a surface. Where it came a way that it takes with the probability `share`, what
 // lies the other way counts as white. Roulette may leave a throughput above 1. Deep colours count as LEAST_TINT of their strongest channel
