@@ -1,6 +1,10 @@
 //! Tests the GPU layer on a real device under Vulkan's validation layers: any of their messages fails a test.
 mod support;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Barrier, mpsc};
+use std::thread;
+use std::time::Duration;
 use support::kernels::{far, mix, next};
 use support::{assert_silent, hash, words};
 use tallow::error::{Error, Result};
@@ -423,4 +427,46 @@ fn objects_are_named_while_other_devices_come_and_go() {
             Buffer::<u32>::new(&gpu, "named", 1, Location::Device).unwrap();
         }
     });
+}
+
+/// Of four threads that submit what takes milliseconds, one always runs. Each uses what both readers wait for.
+#[test]
+fn who_reads_gets_through_between_threads_that_submit_without_pause() {
+    const MOST: u32 = 100; // submissions of a thread
+    let gpu = support::gpu();
+    let make = |name| Buffer::from_slice(&gpu, name, &words(1 << 22, 1)).unwrap();
+    let buffers = [make("a"), make("b")];
+    let ((sender, done), stop) = (mpsc::channel(), Arc::new(AtomicBool::new(false)));
+    let begun = Arc::new(Barrier::new(6));
+    let submits = || {
+        let (gpu, buffers, sender) = (gpu.clone(), buffers.clone(), sender.clone());
+        let (stop, begun) = (stop.clone(), begun.clone());
+        thread::spawn(move || {
+            let mut frame = FrameResources::new(&gpu).unwrap();
+            begun.wait();
+            for value in (0..MOST).take_while(|_| !stop.load(Relaxed)) {
+                gpu.run(&mut frame, |rec| buffers.iter().try_for_each(|buffer| rec.fill(buffer, value))).unwrap();
+            }
+            sender.send("submitted").unwrap();
+        })
+    };
+    let reads = |buffer: &Buffer<u32>| {
+        let (buffer, sender, begun) = (buffer.clone(), sender.clone(), begun.clone());
+        thread::spawn(move || {
+            begun.wait();
+            for _ in 0..20 {
+                thread::sleep(Duration::from_millis(5)); // others submit meanwhile
+                buffer.read_range(0..1).unwrap();
+            }
+            sender.send("read").unwrap();
+        })
+    };
+    let threads: Vec<_> = (0..4).map(|_| submits()).chain(buffers.iter().map(reads)).collect();
+    let next = || done.recv_timeout(Duration::from_secs(120)).expect("nobody waits for ever");
+    let first = [next(), next()];
+    stop.store(true, Relaxed);
+    let rest = [(); 4].map(|()| next());
+    threads.into_iter().for_each(|thread| thread.join().unwrap());
+    assert_eq!((first, rest), (["read"; 2], ["submitted"; 4]));
+    assert_silent(&gpu);
 }

@@ -1,4 +1,5 @@
 //! Typed, named buffers in device memory: allocation, binding, and element access from the host.
+use super::turns::{Host, Turns};
 use super::{At, DeviceKind, Gpu, LESS_MEMORY, explain};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -7,8 +8,8 @@ use bytemuck::Pod;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::{AllocationError, MemoryLocation};
 use std::marker::PhantomData;
-use std::ops::Range;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::ops::{Deref, DerefMut, Range};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A part of a buffer begins at a multiple of this many elements. An element has at least 4 bytes, so the offset is a
 /// multiple of 256 bytes, the largest alignment that Vulkan lets a device require.
@@ -94,10 +95,9 @@ pub struct Untyped {
     stride: u64,
     /// Bytes of one texel, for kernels that read it so.
     texel: u64,
-    /// The lock also serialises accesses by the host.
     memory: Mutex<Memory>,
-    /// Told when a submission that uses it is complete.
-    released: Condvar,
+    /// Who may access the memory.
+    pub(super) turns: Turns,
     views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
 }
 
@@ -224,9 +224,9 @@ impl<T: Pod> Buffer<T> {
         Ok(values)
     }
 
-    /// Whether [`Self::read`] takes no submission.
+    /// Whether [`Self::read`] takes no submission. This waits for no work that runs.
     pub(crate) fn is_read_in_place(&self) -> bool {
-        self.untyped.idle().mapped(self.untyped.for_reading()).is_some()
+        self.untyped.lock().mapped(self.untyped.for_reading()).is_some()
     }
 
     fn no_part(&self, range: &Range<usize>) -> Error {
@@ -315,10 +315,10 @@ impl Untyped {
         // SAFETY: `info` is complete; the device outlives every buffer.
         let raw = unsafe { gpu.0.device.create_buffer(&info, None) }.at(&what)?;
         gpu.0.name(raw, name);
-        let (memory, released, views) = Default::default();
+        let (memory, turns, views) = Default::default();
         // From here on, Drop cleans up if a line below fails.
         let (name, gpu) = (name.to_owned(), gpu.clone());
-        let buffer = Self { gpu, name, raw, size, shown, location, stride, texel, memory, released, views };
+        let buffer = Self { gpu, name, raw, size, shown, location, stride, texel, memory, turns, views };
         buffer.allocate(location, &what)?;
         if let Some(bytes) = buffer.idle().mapped(vk::MemoryPropertyFlags::empty()) {
             bytes[size as usize..shown as usize].fill(0);
@@ -363,10 +363,11 @@ impl Untyped {
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until no submission uses it. None that does begins until the returned lock is dropped.
-    pub(super) fn idle(&self) -> MutexGuard<'_, Memory> {
-        let is_used = |memory: &mut Memory| memory.submissions > 0;
-        self.released.wait_while(self.lock(), is_used).unwrap_or_else(PoisonError::into_inner)
+    /// Waits until no submission uses it. None that does begins until what is returned is dropped; meanwhile this thread may neither
+    /// submit nor ask this of another buffer.
+    pub(super) fn idle(&self) -> Idle<'_> {
+        let host = self.turns.host();
+        Idle { memory: self.lock(), _host: host }
     }
 
     /// What its memory must be for the host to read it where it lies. Integrated GPUs can map uncached memory, which is fast to write but
@@ -377,12 +378,6 @@ impl Untyped {
             Location::Device | Location::Upload => vk::MemoryPropertyFlags::HOST_CACHED,
         }
     }
-
-    /// Keeps the host from the memory, for a submission, until what is returned is dropped.
-    pub(super) fn used(&self) -> Used<'_> {
-        self.lock().submissions += 1;
-        Used(self)
-    }
 }
 
 /// What holds the values of a buffer.
@@ -390,8 +385,6 @@ impl Untyped {
 pub(super) struct Memory {
     /// `None` only during construction.
     allocation: Option<Allocation>,
-    /// Submissions that use it and are not complete.
-    submissions: usize,
 }
 
 impl Memory {
@@ -403,13 +396,23 @@ impl Memory {
     }
 }
 
-/// A buffer that a submission uses.
-pub(super) struct Used<'a>(&'a Untyped);
+/// The memory of a buffer that no submission uses. The lock is given back before others are let in, who would wait for it.
+pub(super) struct Idle<'a> {
+    memory: MutexGuard<'a, Memory>,
+    _host: Host<'a>,
+}
 
-impl Drop for Used<'_> {
-    fn drop(&mut self) {
-        self.0.lock().submissions -= 1;
-        self.0.released.notify_all();
+impl Deref for Idle<'_> {
+    type Target = Memory;
+
+    fn deref(&self) -> &Memory {
+        &self.memory
+    }
+}
+
+impl DerefMut for Idle<'_> {
+    fn deref_mut(&mut self) -> &mut Memory {
+        &mut self.memory
     }
 }
 

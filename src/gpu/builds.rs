@@ -11,8 +11,8 @@ impl Recorder<'_> {
     /// What was built before is overwritten, after passes that read it. Memory that only the builds need goes with the frame.
     ///
     /// # Errors
-    /// [`Error::Usage`] when there are more copies than there is room for, [`Error::Device`] when a mesh of theirs begins beyond triangle
-    /// 2^24, or memory is out.
+    /// [`Error::Usage`] when there are more copies than there is room for or something was made on another device, [`Error::Device`]
+    /// when a mesh of theirs begins beyond triangle 2^24, or memory is out.
     pub(crate) fn build(
         &mut self,
         acceleration: &Acceleration,

@@ -1,4 +1,5 @@
 //! A command buffer with its pool and fence, which is recorded, submitted and waited for.
+use super::turns::Turns;
 use super::{At, Gpu, Untyped, explain};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -55,7 +56,7 @@ impl Commands {
     ) -> Result<()> {
         // SAFETY: the buffer is recording.
         unsafe { self.gpu.0.device.end_command_buffer(self.buffer) }.at("recording")?;
-        let _used: Vec<_> = buffers.into_iter().map(Untyped::used).collect();
+        let _inside = Turns::submission(buffers.into_iter().map(|buffer| &buffer.turns));
         self.gpu.0.submit_and_wait(self.buffer, self.fence, progress).map_err(|code| {
             match (explain("running", code), last_pass()) {
                 (Error::DeviceLost(what), Some(pass)) => {

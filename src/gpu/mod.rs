@@ -37,6 +37,7 @@ mod staging;
 mod timing;
 mod tuned;
 mod tuning;
+mod turns;
 mod upload;
 
 pub use acceleration::Acceleration;

@@ -13,7 +13,8 @@ use bytemuck::Pod;
 use std::ffi::CString;
 use std::sync::Arc;
 
-/// Records passes, in order, into a frame. Dropping it completes the recording.
+/// Records passes, in order, into a frame. Dropping it completes the recording. Kernels, buffers and all else that it is given have to be
+/// of its device: what was made on another is refused as [`Error::Usage`].
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
     frame: &'a mut FrameResources,
@@ -27,8 +28,8 @@ impl Gpu {
     /// is visible to the host.
     ///
     /// # Errors
-    /// Those of `record`, in which case nothing was submitted, and [`Error::Device`] or [`Error::DeviceLost`] when the device
-    /// fails. The frame keeps nothing alive then either.
+    /// Those of `record` and [`Error::Usage`] for a frame of another device, in which cases nothing was submitted, and [`Error::Device`] or
+    /// [`Error::DeviceLost`] when the device fails. The frame keeps nothing alive then either.
     pub fn run(
         &self,
         frame: &mut FrameResources,
@@ -75,12 +76,13 @@ impl<'a> Recorder<'a> {
     ///   `keep_history`, `begin_frame`, `look_up` and `run`, every function of a [`Job`](crate::render::Job), of a
     ///   [`Denoiser`](crate::denoise::Denoiser) `scales`, and [`film::read_back`](crate::render::film::read_back),
     ///   [`Noisy`](crate::denoise::Noisy), [`Filtered`](crate::denoise::Filtered) and
-    ///   [`Scales`](crate::denoise::filter::Scales) of what that submission uses. All of these are safe functions, and nothing but this promise keeps them
-    ///   from memory that the device is writing.
+    ///   [`Scales`](crate::denoise::filter::Scales) of what that submission uses. All of these are safe functions, and nothing but this
+    ///   promise keeps them from memory that the device is writing.
     /// - The recorder is dropped before the command buffer is ended.
     ///
     /// # Errors
-    /// [`Error::Usage`] when the handle is null, [`Error::Device`] when the device is out of memory.
+    /// [`Error::Usage`] when the handle is null or the frame is of another device, [`Error::Device`] when the device is out of memory,
+    /// [`Error::DeviceLost`] when it was lost before.
     pub unsafe fn external(gpu: &'a Gpu, frame: &'a mut FrameResources, command_buffer: u64) -> Result<Self> {
         if command_buffer == 0 {
             return Err(Error::Usage("a null command buffer was handed over".into()));
@@ -113,8 +115,9 @@ impl<'a> Recorder<'a> {
     /// Runs `kernel` on the buffers in `bind` with `groups` workgroups along x, y and z.
     ///
     /// # Errors
-    /// [`Error::Usage`] when a group count is 0, [`Error::Device`] when one is over the device's limit, a buffer is too large for
-    /// its slot, or memory is out.
+    /// [`Error::Usage`] when a group count is 0, a part of a buffer is bound as texels, a kernel that traces by ray queries is given no
+    /// acceleration structures, or something was made on another device; [`Error::Device`] when a group count is over the device's
+    /// limit, a buffer is too large for its slot, or memory is out.
     pub fn dispatch<B: Bindings>(
         &mut self,
         kernel: &Kernel<B>,

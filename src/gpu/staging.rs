@@ -19,7 +19,7 @@ impl Untyped {
             all[offset..offset + bytes.len()].copy_from_slice(bytes);
             return Ok(());
         }
-        drop(memory); // An upload is a submission, which would wait for this lock for ever.
+        drop(memory); // An upload is a submission, which would wait for this for ever.
         upload(self, offset, bytes)
     }
 
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use crate::gpu::{Buffer, DeviceOptions};
 
-    /// Called directly, because devices with unified memory never take this path.
+    /// Called directly, because where the host maps the device's memory nothing is uploaded so, and where that is cached nothing read.
     #[test]
     fn copies_cross_chunks_both_ways() {
         let gpu = Gpu::open(&DeviceOptions { validation: true, ..DeviceOptions::default() }).unwrap();

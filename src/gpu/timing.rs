@@ -225,14 +225,13 @@ impl Timer {
 
     /// The last pass that began, for a message about a lost device. Most drivers still return the queries then.
     pub fn last_started(&self) -> Option<&'static str> {
-        let began = self.queries().ok()?.into_iter().step_by(2).rposition(|[_, available]| available != 0)?;
+        let began = self.queries().0.into_iter().step_by(2).rposition(|[_, available]| available != 0)?;
         Some(self.passes[began])
     }
 
     /// Number of timestamps written so far. It grows as the work proceeds.
     pub fn written(&self) -> usize {
-        let queries = self.queries().unwrap_or_default();
-        queries.iter().filter(|[_, available]| *available != 0).count()
+        self.queries().0.iter().filter(|[_, available]| *available != 0).count()
     }
 
     /// Begin and end of every pass in ticks.
@@ -240,25 +239,27 @@ impl Timer {
     /// # Errors
     /// `NOT_READY` when one is not available yet, and those of Vulkan.
     fn ticks(&self) -> std::result::Result<Vec<[u64; 2]>, vk::Result> {
-        let queries = self.queries()?;
+        let (queries, found) = self.queries();
+        found?;
         match queries.iter().all(|[_, available]| *available != 0) {
             true => Ok(queries.chunks_exact(2).map(|pass| [pass[0][0], pass[1][0]]).collect()),
             false => Err(vk::Result::NOT_READY),
         }
     }
 
-    /// (ticks, availability) of every query; availability is 0 until the timestamp is written.
-    fn queries(&self) -> std::result::Result<Vec<[u64; 2]>, vk::Result> {
+    /// (ticks, availability) of every query, and the first failure; availability is 0 until the timestamp is written. A driver that
+    /// fails on the way, as when the device is lost, has filled in what it came by before.
+    fn queries(&self) -> (Vec<[u64; 2]>, std::result::Result<(), vk::Result>) {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
-        let mut queries = vec![[0; 2]; 2 * self.passes.len()];
+        let (mut queries, mut found) = (vec![[0; 2]; 2 * self.passes.len()], Ok(()));
         for (pool, results) in self.pools.iter().zip(queries.chunks_mut(POOL as usize)) {
             // SAFETY: a live pool; the results have two words per query, as the flags say.
             match unsafe { self.gpu.0.device.get_query_pool_results(*pool, 0, results, flags) } {
                 Ok(()) | Err(vk::Result::NOT_READY) => {} // availabilities are written all the same
-                Err(code) => return Err(code),
+                failed => found = found.and(failed),
             }
         }
-        Ok(queries)
+        (queries, found)
     }
 }
 

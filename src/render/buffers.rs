@@ -196,7 +196,6 @@ fn whole_windows(tile: u64, binding: u64) -> [u32; 2] {
 }
 
 /// A run of the film's pixels, row-major, that fits the device's buffers.
-#[derive(Clone)]
 pub struct FilmTile {
     /// Index of its first pixel in the film.
     pub first_pixel: u32,

@@ -53,7 +53,8 @@ pub(crate) fn bytes_per_pixel(placed: bool) -> u64 {
 }
 
 /// Bytes of host memory that a render with these settings takes at most when its film is read back, the scene not counted: the film,
-/// and its buffers, or, where the device has memory of its own, copies of them.
+/// and its buffers, or, where the device has memory of its own, copies of them. Where the two share memory that the host does not cache,
+/// as on some integrated graphics cards, it takes both the buffers and copies of them, which is not counted.
 pub fn host_bytes(settings: &Settings) -> u64 {
     let placed = !settings.allocate.is_even();
     settings.pixels() as u64 * (FilmBuffers::bytes_per_pixel(placed) + bytes_per_pixel(placed))
@@ -76,13 +77,16 @@ pub fn read_back(renderer: &Renderer) -> Result<Film> {
 /// Copies for the host of what a film is read from. One submission makes them all, since each waits for work of other threads that was
 /// submitted before.
 fn copied(renderer: &Renderer) -> Result<(Vec<FilmTile>, Buffer<f32>)> {
-    let (of_device, mut tiles, mut priority) = (renderer.film(), Vec::new(), None);
+    let of_device = renderer.film();
+    let (mut tiles, mut priority) = (Vec::new(), of_device.counts.priority.clone());
     renderer.gpu.run(&mut FrameResources::new(&renderer.gpu)?, |rec| {
         tiles = of_device.tiles.iter().map(|tile| tile.copied(rec)).collect::<Result<_>>()?;
-        priority = Some(rec.copied(&of_device.counts.priority)?);
+        if !renderer.settings().allocate.is_even() {
+            priority = rec.copied(&priority)?;
+        }
         Ok(())
     })?;
-    Ok((tiles, priority.expect("recorded")))
+    Ok((tiles, priority))
 }
 
 fn read(renderer: &Renderer, tiles: &[FilmTile], priority: &Buffer<f32>) -> Result<Film> {

@@ -218,8 +218,9 @@ impl Renderer {
     /// Records one step.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for a recorder of another device, a step that this renderer has no room for, and after [`Renderer::update`] has failed on the device,
-    /// [`crate::error::Error::Device`]. Other steps of another renderer are not told apart and make a wrong picture.
+    /// [`crate::error::Error::Usage`] for a recorder of another device, a step that this renderer has no room for, and after
+    /// [`Renderer::update`] has failed on the device, [`crate::error::Error::Device`]. Other steps of another renderer are not told apart
+    /// and make a wrong picture.
     pub fn record(&self, rec: &mut Recorder, step: &Step) -> Result<()> {
         rec.gpu().owns("the renderer", &self.gpu)?;
         self.serial.ok_or_else(half_updated)?;

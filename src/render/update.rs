@@ -32,12 +32,12 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Usage`] with the first effect that the scene calls for now and that was not compiled: make the renderer with it, by
-    /// [`Renderer::specialised`]. [`Error::Usage`] also for a recorder of another device, where the scene has changed otherwise than by `change`, for a camera that cannot
-    /// be, for a scene of its own whose hierarchy is deeper, such as one that was loaded in another pose, and for one with another number
-    /// of triangles, materials or textures or an environment of another size; [`Error::Scene`] where everything has changed, to what
-    /// [`Scene::check`] refuses; [`Error::Device`] and [`Error::OutOfDeviceMemory`].
-    /// But for the last two, nothing has changed in the renderer then; the scene keeps its pose. To go back, apply the pose before anew, and
-    /// update with both changes as one. After [`Error::Device`] and [`Error::OutOfDeviceMemory`], host and device do not agree:
+    /// [`Renderer::specialised`]. [`Error::Usage`] also for a recorder of another device, where the scene has changed otherwise than by
+    /// `change`, for a camera that cannot be, for a scene of its own whose hierarchy is deeper, such as one that was loaded in another
+    /// pose, and for one with another number of triangles, materials or textures or an environment of another size; [`Error::Scene`]
+    /// where everything has changed, to what [`Scene::check`] refuses; [`Error::Device`] and [`Error::OutOfDeviceMemory`].
+    /// But for the last two, nothing has changed in the renderer then; the scene keeps its pose. To go back, apply the pose before
+    /// anew, and update with both changes as one. After [`Error::Device`] and [`Error::OutOfDeviceMemory`], host and device do not agree:
     /// [`Renderer::record`] refuses all steps until an update with [`Change::everything`] has succeeded.
     pub fn update(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
         rec.gpu().owns("the renderer", &self.gpu)?;

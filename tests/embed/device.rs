@@ -6,7 +6,6 @@ use crate::support::engine::Engine;
 use crate::support::kernels::next;
 use ash::vk;
 use ash::vk::Handle;
-use std::sync::atomic::Ordering::SeqCst;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, RawDevice, Recorder};
 
 /// Two dependent passes; returns the buffers in use, the result last.
@@ -89,10 +88,13 @@ fn an_engines_clocks_are_tied_together_where_its_device_can() {
 #[test]
 fn a_clock_that_a_device_does_not_read_is_not_asked_for() {
     let engine = Engine::new();
-    hooks::NO_DEVICE_CLOCK.store(true, SeqCst);
     // SAFETY: the engine's handles are valid and outlive what is made from them.
-    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
-    hooks::NO_DEVICE_CLOCK.store(false, SeqCst);
+    let opened = || unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let reads_its_own = support::gpu().calibrate().is_some();
+    assert_eq!(opened().calibrate().is_some(), reads_its_own, "control: without the hook");
+    let hook = hooks::set(&hooks::NO_DEVICE_CLOCK);
+    let gpu = opened();
+    drop(hook);
     assert_eq!(gpu.calibrate(), None);
     assert_eq!(engine.messages(), Vec::<String>::new());
 }

@@ -6,9 +6,9 @@ use crate::support::engine::Engine;
 use ash::vk;
 use ash::vk::Handle;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::sync::mpsc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tallow::denoise::filter::{self, FilterSettings, firefly::Fireflies};
 use tallow::denoise::{Demodulation, Denoiser};
@@ -103,9 +103,9 @@ fn a_lost_device_is_one_line_and_exit_code_4() {
     let scene = scene();
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    hooks::LOSE.store(true, SeqCst);
+    let losing = hooks::set(&hooks::LOSE);
     let lost = renderer.run(&mut frame, &Step::Start).map(drop);
-    hooks::LOSE.store(false, SeqCst);
+    drop(losing);
     let error = lost.unwrap_err();
     assert!(matches!(error, Error::DeviceLost(_)) && error.exit_code() == 4);
     let line = error.to_string();
@@ -128,12 +128,36 @@ fn times_of_a_lost_device_say_so_and_nothing_is_read_from_it_then() {
     let mut frame = FrameResources::new(&gpu).unwrap();
     renderer.run(&mut frame, &Step::Start).unwrap();
     assert!(frame.times().is_ok() && renderer.picture().is_ok(), "control: nothing fails without the hook");
-    hooks::LOSE.store(true, SeqCst);
+    let losing = hooks::set(&hooks::LOSE);
     let lost = [frame.times().map(drop), frame.passes().map(drop)];
-    hooks::LOSE.store(false, SeqCst);
+    drop(losing);
     for refused in lost.into_iter().chain([renderer.picture().map(drop)]) {
         assert!(matches!(refused, Err(Error::DeviceLost(_))), "{refused:?}");
     }
+}
+
+/// What a driver tells of the times before it says that the device is lost names the pass in the message.
+#[test]
+fn a_device_that_is_lost_on_the_way_tells_the_last_pass() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let buffer = Buffer::from_slice(&gpu, "filled", &[1u32]).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let (device, losing) = (engine.device.clone(), Arc::new(Mutex::new(None)));
+    let lose = losing.clone();
+    *hooks::BEFORE_WAIT.lock().unwrap() = Some(Box::new(move || {
+        // SAFETY: nobody else uses the engine's device.
+        unsafe { device.device_wait_idle() }.unwrap();
+        hooks::WAIT.store(vk::Result::ERROR_DEVICE_LOST.as_raw(), SeqCst);
+        *lose.lock().unwrap() = Some(hooks::set(&hooks::LOSE));
+    }));
+    let lost = gpu.run(&mut frame, |rec| rec.update(&buffer, &2).and_then(|()| rec.fill(&buffer, 7)));
+    *hooks::BEFORE_WAIT.lock().unwrap() = None;
+    hooks::WAIT.store(0, SeqCst);
+    drop(losing.lock().unwrap().take());
+    let line = lost.unwrap_err().to_string();
+    assert!(line.contains("the last pass to start was \"fill\""), "{line}");
 }
 
 /// Out of memory says nothing of the work that was submitted: it is over before anything of it is freed.
@@ -244,7 +268,7 @@ fn a_film_is_read_while_a_submission_runs() {
     assert_eq!(engine.messages(), Vec::<String>::new());
 }
 
-/// Whether another thread does something before a submission ends that waits for it, though not for long.
+/// Whether `work` ends on another thread while a submission is held back, for 10 s at most.
 fn is_done_meanwhile(gpu: &Gpu, work: impl FnOnce() + Send) -> bool {
     let buffer = Buffer::from_slice(gpu, "in use", &[1u32]).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
@@ -272,11 +296,11 @@ fn is_done_meanwhile(gpu: &Gpu, work: impl FnOnce() + Send) -> bool {
 fn a_film_that_is_copied_takes_one_submission() {
     let engine = Engine::new();
     let scene = scene();
-    let film = |uncached| {
-        hooks::UNCACHED.store(uncached, SeqCst);
+    let film = |uncached: bool| {
+        let hook = uncached.then(|| hooks::set(&hooks::UNCACHED));
         // SAFETY: the engine's handles are valid and outlive what is made from them.
         let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
-        hooks::UNCACHED.store(false, SeqCst);
+        drop(hook);
         let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
         Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
         hooks::take_calls();
