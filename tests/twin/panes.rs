@@ -12,7 +12,8 @@ const PANE: &str = "[[material]]\nname = 'pane'\ntype = 'metallic-roughness'\nme
 /// way, a pane of colour, and a veil.
 pub fn panes() -> Loaded {
     let workplace = Workplace::new().picture("stained.png", 4, |x, y| [255 - 40 * x as u8, 160, 60 * y as u8]);
-    let workplace = workplace.picture("rough.png", 4, |x, _| [0, if x < 2 { 20 } else { 200 }, 255]);
+    // The step is steep: between its texels sharp lobes, by which lamps are chosen, magnify what rounding makes of a roughness.
+    let workplace = workplace.picture("rough.png", 64, |x, _| [0, if x < 32 { 20 } else { 200 }, 255]);
     let mut scene = workplace.scene(&format!(
         "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\n[render]\nmax_depth = 4\n\
          [environment]\nradiance = 0.2\n[[light]]\ntype = 'directional'\ndirection = [0.3, -1.0, -0.4]\nirradiance = 3.0\n\
