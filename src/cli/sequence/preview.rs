@@ -185,10 +185,10 @@ mod tests {
         let partial = folder.path().join("a.partial.gif");
         let of = |frames: usize| Preview(vec![RgbaImage::new(1, 1); frames]);
         let bytes = |path: &Path| std::fs::read(path).unwrap();
-        assert_eq!(of(1).save(&path, 24.0, true).unwrap(), [path.clone()]);
+        assert_eq!(of(1).save(&path, 24.0, true).unwrap(), std::slice::from_ref(&path));
         let older = bytes(&path);
         for frames in [2, 3] {
-            assert_eq!(of(frames).save(&path, 24.0, false).unwrap(), [partial.clone()]);
+            assert_eq!(of(frames).save(&path, 24.0, false).unwrap(), std::slice::from_ref(&partial));
         }
         let read = GifDecoder::new(std::io::Cursor::new(bytes(&partial))).unwrap().into_frames();
         assert_eq!((read.count(), bytes(&path) == older), (3, true));
