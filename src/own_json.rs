@@ -17,7 +17,7 @@ pub(crate) struct OwnJson {
 }
 
 impl OwnJson {
-    /// Reads one.
+    /// Reads a file of this kind.
     ///
     /// # Errors
     /// What is wrong with it, and what to do.

@@ -8,7 +8,7 @@ use bytemuck::Pod;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::{AllocationError, MemoryLocation};
 use std::marker::PhantomData;
-use std::ops::{Deref, DerefMut, Range};
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A part of a buffer begins at a multiple of this many elements. An element has at least 4 bytes, so the offset is a
@@ -95,7 +95,8 @@ pub struct Untyped {
     stride: u64,
     /// Bytes of one texel, for kernels that read it so.
     texel: u64,
-    memory: Mutex<Memory>,
+    /// `None` only during construction.
+    memory: Mutex<Option<Allocation>>,
     /// Who may access the memory.
     pub(super) turns: Turns,
     views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
@@ -226,7 +227,7 @@ impl<T: Pod> Buffer<T> {
 
     /// Whether [`Self::read`] takes no submission. This waits for no work that runs.
     pub(crate) fn is_read_in_place(&self) -> bool {
-        self.untyped.lock().mapped(self.untyped.for_reading()).is_some()
+        mapped(&mut self.untyped.lock(), self.untyped.for_reading()).is_some()
     }
 
     fn no_part(&self, range: &Range<usize>) -> Error {
@@ -355,11 +356,11 @@ impl Untyped {
         })?;
         // SAFETY: fresh memory that fits the requirements, kept until the buffer is destroyed.
         let bound = unsafe { device.bind_buffer_memory(self.raw, memory.memory(), memory.offset()) };
-        self.lock().allocation = Some(memory);
+        *self.lock() = Some(memory);
         bound.at(what)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Memory> {
+    fn lock(&self) -> MutexGuard<'_, Option<Allocation>> {
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -380,46 +381,30 @@ impl Untyped {
     }
 }
 
-/// What holds the values of a buffer.
-#[derive(Default)]
-pub(super) struct Memory {
-    /// `None` only during construction.
-    allocation: Option<Allocation>,
-}
-
-impl Memory {
-    /// The mapped bytes; `None` if the memory is not mapped, not coherent, or lacks a property in `also`.
-    pub fn mapped(&mut self, also: vk::MemoryPropertyFlags) -> Option<&mut [u8]> {
-        let memory = self.allocation.as_mut()?;
-        let fits = memory.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT | also);
-        memory.mapped_slice_mut().filter(|_| fits)
-    }
+/// The mapped bytes of `memory`; `None` if it is not mapped, not coherent, or lacks a property in `also`.
+fn mapped(memory: &mut Option<Allocation>, also: vk::MemoryPropertyFlags) -> Option<&mut [u8]> {
+    let memory = memory.as_mut()?;
+    let fits = memory.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT | also);
+    memory.mapped_slice_mut().filter(|_| fits)
 }
 
 /// The memory of a buffer that no submission uses. The lock is given back before others are let in, who would wait for it.
 pub(super) struct Idle<'a> {
-    memory: MutexGuard<'a, Memory>,
+    memory: MutexGuard<'a, Option<Allocation>>,
     _host: Host<'a>,
 }
 
-impl Deref for Idle<'_> {
-    type Target = Memory;
-
-    fn deref(&self) -> &Memory {
-        &self.memory
-    }
-}
-
-impl DerefMut for Idle<'_> {
-    fn deref_mut(&mut self) -> &mut Memory {
-        &mut self.memory
+impl Idle<'_> {
+    /// As [`mapped`].
+    pub fn mapped(&mut self, also: vk::MemoryPropertyFlags) -> Option<&mut [u8]> {
+        mapped(&mut self.memory, also)
     }
 }
 
 impl Drop for Untyped {
     fn drop(&mut self) {
         let views = std::mem::take(self.views.get_mut().unwrap_or_else(PoisonError::into_inner));
-        let memory = self.memory.get_mut().unwrap_or_else(PoisonError::into_inner).allocation.take();
+        let memory = self.memory.get_mut().unwrap_or_else(PoisonError::into_inner).take();
         self.gpu.0.free(|device| {
             // SAFETY: not in use, since whoever records a buffer keeps it until the work is complete; destroyed once.
             unsafe {
