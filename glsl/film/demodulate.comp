@@ -2,6 +2,7 @@
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
 #include "shared/luminance.glsl"
+#include "shared/gloss_cell.glsl"
 
 // Takes one pixel per thread of a noisy image apart for a filter: colour = sharp + factor * filtered, where `sharp` is not
 // filtered and `filtered` is light before albedo. Twin: denoise::twin::demodulate.
@@ -11,11 +12,13 @@ layout(constant_id = 110) const uint DEMODULATION = LIGHT;
 layout(constant_id = 112) const bool INDIRECT_VARIANCE = true; // LIGHT: indirect_m2 is known
 layout(constant_id = 113) const bool MEASURED = true; // any variance of what is filtered is known
 layout(constant_id = 116) const bool LENS = false; // what the lens blurs is filtered as it is
+layout(constant_id = 117) const bool GLOSS = false; // LIGHT: light that does not follow albedo is not divided by it
 layout(scalar, binding = 3) writeonly buffer Radiance { vec4 radiance[]; };
 layout(scalar, binding = 4) writeonly buffer Variance { vec3 variance[]; };
 layout(scalar, binding = 5) writeonly buffer Factor { vec4 factor[]; };
 layout(scalar, binding = 6) writeonly buffer Sharp { vec4 sharp[]; };
 layout(binding = 7) uniform samplerBuffer blur; // of float, where the lens counts: how far it blurs what a pixel shows
+layout(binding = 8) uniform samplerBuffer gloss; // of vec4, a cell: see gloss.comp
 layout(scalar, push_constant) uniform Push { SizePush push; };
 
 // A pixel with more than this many times its neighbours' median light may partly show something without albedo.
@@ -30,16 +33,11 @@ struct Parts {
 
 bool sampled(int i) { return count_at(i) > 0.0 && finite(colour_at(i)); }
 
-// Pixels show one surface where their normals have at least this cosine, and one lies at most so far off the other's plane, as a share of
-// its depth.
-const float ONE_SURFACE_COSINE = 0.9, ONE_PLANE = 0.02;
 const int AROUND = 2; // pixels; the weights have a standard deviation of one
 
 // Whether pixel `q` tells how the key light shines on the surface that `i` shows.
 bool tells_key_light(int q, int i) {
-    vec3 normal = Guide_normal(guide, i), off = Guide_position(guide, q) - Guide_position(guide, i);
-    bool lit = sampled(q) && !marked(q, ALL_PASSED_OVER | SOME_BARE) && reflects(albedo_at(q));
-    return lit && dot(normal, Guide_normal(guide, q)) > ONE_SURFACE_COSINE && abs(dot(normal, off)) < ONE_PLANE * Guide_depth(guide, i);
+    return sampled(q) && !marked(q, ALL_PASSED_OVER | SOME_BARE) && reflects(albedo_at(q)) && one_surface(q, i);
 }
 
 // Direct light. Where all samples passed over the key light, the pixels around tell what it brings.
@@ -60,10 +58,31 @@ vec3 direct_at(int i) {
     return own + max(number(albedo_at(i)), vec3(0.0)) * sum.rgb / max(sum.w, 1e-20);
 }
 
+// The albedo that the light of a pixel follows: of the share that does not follow it, the mean around stands for it. Cells around tell both, those
+// whose middle shows the same surface and material. What a channel does not reflect stays so.
+vec3 followed_albedo(int i, vec3 albedo) {
+    if (!GLOSS || !tells_albedo(i)) return albedo;
+    vec2 between = vec2(i % int(push.size.x) - GLOSS_CELL / 2, i / int(push.size.x) - GLOSS_CELL / 2) / float(GLOSS_CELL);
+    ivec2 first = ivec2(floor(between)), grid = gloss_cells_of(push.size);
+    vec2 part = between - vec2(first);
+    vec4 sum = vec4(0.0);
+    float weights = 0.0;
+    for (int k = 0; k < 4; k++) {
+        ivec2 corner = ivec2(k & 1, k >> 1), cell = clamp(first + corner, ivec2(0), grid - 1);
+        vec4 told = texelFetch(gloss, cell.y * grid.x + cell.x);
+        if (!connected(middle_of(cell, push.size), i) || !one_material(told.rgb, albedo)) continue;
+        vec2 near = mix(1.0 - part, part, vec2(corner));
+        sum += near.x * near.y * vec4(told.w * told.rgb, told.w);
+        weights += near.x * near.y;
+    }
+    sum /= max(weights, 1e-20);
+    return mix(vec3(0.0), albedo * (1.0 - sum.w) + sum.rgb, greaterThan(albedo, vec3(0.0)));
+}
+
 // The albedo that light is divided by and multiplied with is that of the samples, so that edges and textures keep their
 // antialiasing: a pixel that shows a surface in part has a part of its albedo.
 Parts split_light(int i) {
-    vec3 factor = max(number(albedo_at(i)), vec3(0.0)), direct = direct_at(i);
+    vec3 factor = followed_albedo(i, max(number(albedo_at(i)), vec3(0.0))), direct = direct_at(i);
     return Parts(number((colour_at(i) - direct) / factor), factor, number(direct));
 }
 

@@ -2,6 +2,7 @@
 //! tell of modulation. Twin: [`super::twin`].
 use super::filter::firefly::{Cut, Fireflies, Removed};
 use super::filter::{Filter, Planes};
+use super::gloss::Gloss;
 use super::sparse::Sparse;
 use super::{Demodulation, ExpectedError, Holds, Noisy};
 use crate::error::Result;
@@ -24,6 +25,7 @@ pub struct Demodulated {
     pub picture: Buffer<vec4>,
     direct: Option<Direct>,
     cut: Option<Cut>,
+    gloss: Gloss,
 }
 
 /// Direct light before albedo, where some pixels have none of their own: a filter in-paints it.
@@ -34,8 +36,9 @@ struct Direct {
 }
 
 impl Demodulated {
-    /// For `noisy` and images that hold the same. With `in_paint`, pixels without direct light take it from the others; else, with
-    /// `blurred`, the share of a pixel that a lens blurs is filtered as it is. Of what is filtered, `fireflies` are cut.
+    /// For `noisy` and images that hold the same. With `in_paint`, pixels without direct light take it from the others. For filters that weigh
+    /// noise (`weighs_noise`), light that does not follow albedo is not divided by it: what a gloss mirrors and, unless pixels are
+    /// in-painted, the share of a pixel that a lens blurs. Of what is filtered, `fireflies` are cut.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the planes do not fit.
@@ -43,17 +46,19 @@ impl Demodulated {
         gpu: &Gpu,
         noisy: &Noisy,
         demodulation: Demodulation,
-        blurred: bool,
+        weighs_noise: bool,
         in_paint: bool,
         fireflies: Fireflies,
     ) -> Result<Self> {
         let (holds, pixels) = (noisy.holds, noisy.stats.len());
         let measured = holds.variance_of_filtered(demodulation);
+        let gloss = Gloss::new(gpu, noisy, demodulation, weighs_noise)?;
         let constants = demodulate::Constants {
             demodulation: demodulation as u32,
             indirect_variance: holds.indirect_variance,
             measured,
-            lens: blurred && holds.blur && !in_paint,
+            lens: weighs_noise && holds.blur && !in_paint,
+            gloss: gloss.is_wanted(),
             noisy: holds.constants(),
             ..Default::default()
         };
@@ -85,6 +90,7 @@ impl Demodulated {
             variance,
             factor: plane("factor")?,
             picture: plane("picture")?,
+            gloss,
             direct: in_paint.then(|| Direct::new(gpu, holds, pixels)).transpose()?,
         })
     }
@@ -119,7 +125,9 @@ impl Demodulated {
             factor: &self.factor,
             sharp: &self.picture,
             blur: &noisy.blur,
+            gloss: &self.gloss.cells,
         };
+        self.gloss.record(rec, noisy)?;
         rec.dispatch_threads(&self.split, bind, &SizePush { size, ..Default::default() }, count)?;
         if let Some(sparse) = &self.sparse {
             sparse.record_decimate(rec, planes, uncut)?;

@@ -7,6 +7,9 @@
 /// | `Light` | all light but direct light, before albedo | that albedo | direct light: the emission that is seen, and what the key light brings |
 /// | `Albedo` | colour / albedo, or what a noisy mirror or clear glass shows | albedo, or 1 | lamps, sky |
 /// | `Off` | colour | 1 | nothing |
+///
+/// For filters that weigh noise, the factor of `Light` has the mean albedo around for the share of light that does not follow albedo, as what a
+/// gloss mirrors: see `glsl/film/gloss.comp`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demodulation {
     /// Surface colour and direct light.

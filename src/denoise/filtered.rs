@@ -60,8 +60,8 @@ impl Recipe<'_> {
         filter::check_size(gpu, noisy.size)?;
         let demodulation = self.demodulation(noisy.holds());
         let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
-        let blurred = self.method.weighs_noise() && !self.looked_up;
-        Demodulated::new(gpu, noisy, demodulation, blurred, in_paint, self.fireflies())
+        let weighs_noise = self.method.weighs_noise() && !self.looked_up;
+        Demodulated::new(gpu, noisy, demodulation, weighs_noise, in_paint, self.fireflies())
     }
 }
 

@@ -8,6 +8,7 @@ pub mod expected;
 pub mod file;
 pub mod filter;
 mod filtered;
+mod gloss;
 mod light_left;
 mod noisy;
 #[doc(hidden)]

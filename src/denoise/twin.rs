@@ -6,8 +6,9 @@ use super::{Demodulation, Holds};
 use crate::image::aov::Aovs;
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::demodulate::{AROUND, MIRRORED, ONE_PLANE, ONE_SURFACE_COSINE, OUTLIER};
+use crate::shaders::demodulate::{AROUND, MIRRORED, OUTLIER};
 use crate::shaders::shared::albedo::{SMALLEST_ALBEDO, WHOLE};
+use crate::shaders::shared::gloss_cell::{ONE_PLANE, ONE_SURFACE_COSINE};
 use crate::shaders::shared::sample_marks::{ALL_PASSED_OVER, SOME_BARE};
 use glam::Vec3;
 
@@ -26,6 +27,8 @@ pub struct Pixels {
     pub guide: Vec<Guide>,
     /// How far the lens blurs what each pixel shows; empty where it is not asked for.
     pub blur: Vec<f32>,
+    /// Whether light that does not follow albedo is not divided by it, as for filters that weigh noise.
+    pub gloss: bool,
 }
 
 /// An image taken apart.
@@ -46,8 +49,8 @@ pub struct Parts {
 }
 
 impl Pixels {
-    /// Those of a file.
-    pub fn of_file(aovs: &Aovs) -> Self {
+    /// Those of a file; see [`Pixels::gloss`] for `weighs_noise`.
+    pub fn of_file(aovs: &Aovs, weighs_noise: bool) -> Self {
         let (layers, pixels) = (Layers::new(aovs), 0..aovs.film.pixels());
         Self {
             size: aovs.film.size(),
@@ -56,6 +59,7 @@ impl Pixels {
             light: pixels.clone().map(|i| layers.light(i)).collect(),
             guide: pixels.clone().map(|i| layers.guide(i)).collect(),
             blur: if layers.holds().blur { pixels.map(|i| layers.blur(i)).collect() } else { Vec::new() },
+            gloss: weighs_noise,
         }
     }
 
@@ -93,9 +97,10 @@ impl Pixels {
     }
 }
 
-/// Takes a file's image apart, and in-paints direct light where it is missing: what [`super::Filtered`] does before it filters.
-pub fn split(aovs: &Aovs, demodulation: Demodulation) -> Parts {
-    let pixels = Pixels::of_file(aovs);
+/// Takes a file's image apart, and in-paints direct light where it is missing: what [`super::Filtered`] does before it filters. See
+/// [`Pixels::gloss`] for `weighs_noise`.
+pub fn split(aovs: &Aovs, demodulation: Demodulation, weighs_noise: bool) -> Parts {
+    let pixels = Pixels::of_file(aovs, weighs_noise);
     let lit = |i: usize| pixels.count(i) != 0.0 && pixels.light[i].direct.iter().all(|v| v.is_finite());
     let apart = pixels.holds.demodulation(demodulation) == Demodulation::Light;
     let in_paint = apart && !(0..pixels.stats.len()).all(lit);
@@ -107,7 +112,10 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
     let blur = |i: usize| pixels.blur.get(i).filter(|_| !in_paint).copied();
     let all = 0..pixels.stats.len();
     let demodulation = pixels.holds.demodulation(demodulation);
-    let parts: Vec<Part> = all.clone().map(|i| blurred(pixels, i, blur(i), part(pixels, demodulation, i))).collect();
+    let with_gloss = pixels.gloss && demodulation == Demodulation::Light;
+    let cells = if with_gloss { gloss::cells(pixels) } else { Vec::new() };
+    let apart = |i| part(pixels, demodulation, &cells, i);
+    let parts: Vec<Part> = all.clone().map(|i| blurred(pixels, i, blur(i), apart(i))).collect();
     let factor: Vec<vec3> = parts.iter().map(|p| p.factor).collect();
     let radiance = |i: usize| {
         let [r, g, b] = with_unreflected(parts[i].filtered, &factor[i]);
@@ -184,10 +192,10 @@ struct Part {
     sharp: vec3,
 }
 
-fn part(pixels: &Pixels, demodulation: Demodulation, i: usize) -> Part {
+fn part(pixels: &Pixels, demodulation: Demodulation, cells: &[vec4], i: usize) -> Part {
     let (colour, albedo) = (pixels.stats[i].mean, pixels.albedo(i));
     match demodulation {
-        Demodulation::Light => split_light(pixels, i),
+        Demodulation::Light => split_light(pixels, cells, i),
         Demodulation::Albedo if is_mirror(pixels, i) => Part { filtered: colour, factor: [1.0; 3], sharp: [0.0; 3] },
         Demodulation::Albedo if !reflects(albedo) => {
             let sharp = if pixels.sampled(i) { colour } else { light_around(pixels, i) };
@@ -205,21 +213,25 @@ fn part(pixels: &Pixels, demodulation: Demodulation, i: usize) -> Part {
     }
 }
 
-fn split_light(pixels: &Pixels, i: usize) -> Part {
+fn split_light(pixels: &Pixels, cells: &[vec4], i: usize) -> Part {
     let (direct, colour) = (direct_at(pixels, i), pixels.stats[i].mean);
-    let factor = pixels.albedo(i).map(|a| number(a).max(0.0));
+    let factor = gloss::followed_albedo(pixels, cells, i, pixels.albedo(i).map(|a| number(a).max(0.0)));
     let filtered = |c: usize| number((colour[c] - direct[c]) / factor[c]);
     Part { filtered: std::array::from_fn(filtered), factor, sharp: direct.map(number) }
 }
 
 /// Whether pixel `q` tells how the key light shines on the surface that `i` shows.
 fn tells_key_light(pixels: &Pixels, q: usize, i: usize) -> bool {
+    let lit = !pixels.marked(q, ALL_PASSED_OVER | SOME_BARE);
+    pixels.sampled(q) && lit && reflects(pixels.albedo(q)) && one_surface(pixels, q, i)
+}
+
+/// Whether pixel `q` shows the surface that `i` shows.
+fn one_surface(pixels: &Pixels, q: usize, i: usize) -> bool {
     let (own, theirs) = (&pixels.guide[i], &pixels.guide[q]);
     let normal = Vec3::from(own.normal);
     let off = normal.dot(Vec3::from(theirs.position) - Vec3::from(own.position));
-    let lit = !pixels.marked(q, ALL_PASSED_OVER | SOME_BARE);
-    let known = pixels.sampled(q) && lit && reflects(pixels.albedo(q));
-    known && normal.dot(theirs.normal.into()) > ONE_SURFACE_COSINE && off.abs() < ONE_PLANE * own.depth
+    normal.dot(theirs.normal.into()) > ONE_SURFACE_COSINE && off.abs() < ONE_PLANE * own.depth
 }
 
 /// Direct light. Where all samples passed over the key light, the pixels around tell what it brings.
@@ -351,5 +363,6 @@ fn neighbours([width, height]: [u32; 2], i: usize, reach: usize) -> impl Iterato
     rows.flat_map(move |y| columns.clone().map(move |x| y * width + x)).filter(move |&q| q != i)
 }
 
+mod gloss;
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,7 @@ use super::{Field, Struct, float, uint, uvec2, vec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
-    /// Push constants of `demodulate.comp`, `as_light.comp`, `auto_cells.comp` and `expected_error.comp`.
+    /// Push constants of `demodulate.comp`, `gloss.comp`, `as_light.comp`, `auto_cells.comp` and `expected_error.comp`.
     struct SizePush {
         /// Film in pixels.
         size: uvec2,

@@ -220,7 +220,7 @@ fn an_engine_filters_its_frames_where_they_are() {
             });
         }
         assert!(frame.times().unwrap().iter().any(|pass| pass.name == "demodulate"), "the filter's passes are timed");
-        let parts = twin::split(&aovs, demodulation);
+        let parts = twin::split(&aovs, demodulation, name == "auto");
         let expected = parts.remodulate(&filter::run(&gpu, row, &parts.input, &settings).unwrap().0);
         let off = |(found, expected): (&vec4, &vec3)| {
             largest((0..3).map(|c| (found[c] - expected[c]).abs() / expected[c].abs().max(1e-2)))

@@ -109,6 +109,24 @@ impl Frame {
         self
     }
 
+    /// On one wall of tiles whose gloss mirrors as much light as they scatter.
+    fn with_gloss(mut self) -> Self {
+        for (i, (stats, light)) in self.stats.iter_mut().zip(&mut self.light).enumerate() {
+            let (x, y) = (i as u32 % self.size[0], i as u32 / self.size[0]);
+            let is_dark = (x / 3 + y / 3) % 2 == 0;
+            let guide = &mut self.guide[i];
+            (guide.normal, guide.depth) = ([0.0, 0.0, 1.0], 1.0);
+            guide.position = [x as f32 * 0.01, y as f32 * 0.01, if i % 29 == 3 { 0.5 } else { 0.0 }];
+            if light.albedo.iter().all(|&a| a > 0.0 && a.is_finite()) && stats.mean[1].is_finite() {
+                let noise = stats.mean[1] / (light.albedo[1] + 1.0);
+                light.albedo = if is_dark { [0.2, 0.25, 0.3] } else { [0.5, 0.6, 0.55] };
+                stats.mean = std::array::from_fn(|c| light.direct[c] + (0.5 + 0.1 * noise) * (light.albedo[c] + 0.4));
+                guide.albedo = light.albedo;
+            }
+        }
+        self
+    }
+
     /// Every fifth pixel without a sample, and so without light of its own.
     fn sparse(mut self) -> Self {
         for i in (0..self.stats.len()).step_by(5) {
@@ -125,17 +143,22 @@ impl Frame {
         in_paint: bool,
         stride: u32,
     ) -> Vec<vec4> {
-        let Self { size, stats, light, guide, blur } = self;
-        let (stats, light, guide, blur) = (stats.clone(), light.clone(), guide.clone(), blur.clone());
-        let holds = Holds::film(true, true, !blur.is_empty(), stride);
-        let pixels = Pixels { size: *size, holds, stats, light, guide, blur };
-        let parts = demodulate(&pixels, demodulation, in_paint);
+        let gloss = matches!(filter, "svgf" | "auto");
+        let parts = demodulate(&self.pixels(stride, gloss), demodulation, in_paint);
         if stride == 1 {
             return twins(parts, filter, settings);
         }
-        let filtered = (find(filter).unwrap().reference)(&decimated(&parts.input, stride), settings);
-        let whole = parts.remodulate(&upsampled(&filtered, &parts.input.guide, *size, stride));
+        let (size, filtered) =
+            (self.size, (find(filter).unwrap().reference)(&decimated(&parts.input, stride), settings));
+        let whole = parts.remodulate(&upsampled(&filtered, &parts.input.guide, size, stride));
         whole.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
+    }
+
+    fn pixels(&self, stride: u32, gloss: bool) -> Pixels {
+        let Self { size, stats, light, guide, blur } = self;
+        let (stats, light, guide, blur) = (stats.clone(), light.clone(), guide.clone(), blur.clone());
+        let holds = Holds::film(true, true, !blur.is_empty(), stride);
+        Pixels { size: *size, holds, stats, light, guide, blur, gloss }
     }
 
     fn upload(&self, renderer: &Renderer) {
@@ -250,6 +273,30 @@ fn what_a_lens_blurs_is_filtered_as_it_is() {
     assert_silent(&gpu);
 }
 
+/// By filters that weigh noise; others keep to albedo, as their papers do.
+#[test]
+fn what_a_gloss_mirrors_is_filtered_as_it_is() {
+    let gpu = gpu();
+    let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
+    for size in [[1, 1], [31, 1], [1, 65], [64, 2], [65, 37], [32, 48]] {
+        let renderer = renderer(&gpu, size, Outputs::FILTERED, "uniform");
+        for (broken, demodulation) in [false, true].iter().flat_map(|&b| DEMODULATIONS.map(|d| (b, d))) {
+            let frame = Frame::new(size, broken).with_gloss();
+            let device = frame.on_the_device(&gpu, &renderer, "svgf", &settings, demodulation);
+            let off = |gloss| {
+                let host = twins(demodulate(&frame.pixels(1, gloss), demodulation, false), "svgf", &settings);
+                picture::apart(&device, &host, 1e-3)
+            };
+            assert!(off(true) < 3e-4, "{demodulation:?} {size:?} {broken}: {}", off(true));
+            assert!(device.iter().flatten().all(|v| v.is_finite()), "{demodulation:?} {size:?} {broken}");
+            // Small windows have too few pairs of pixels.
+            let same = demodulation != Demodulation::Light || size[0].min(size[1]) < 30;
+            assert_eq!(off(false) > 1e-2, !same, "control: {demodulation:?} {size:?} {broken}: {}", off(false));
+        }
+    }
+    assert_silent(&gpu);
+}
+
 /// Of which indirect light is traced in every third column and row; broken ones hold what no frame should.
 #[test]
 fn sparse_frames_are_filled_in_as_by_their_twins() {
@@ -306,7 +353,7 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
             film.channels.retain(|c| !missing.iter().any(|layer| c.name.starts_with(layer)));
             let aovs = Aovs::find(&film, &Names::new()).unwrap();
             for demodulation in DEMODULATIONS {
-                let host = twins(split(&aovs, demodulation), "svgf", &settings);
+                let host = twins(split(&aovs, demodulation, true), "svgf", &settings);
                 let recipe = Recipe {
                     method: find("svgf").unwrap().into(),
                     demodulation: Some(demodulation),
@@ -329,8 +376,9 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
 #[test]
 fn a_film_and_its_file_become_one_picture() {
     let gpu = gpu();
-    for frame in [Frame::new([65, 3], true), Frame::new([65, 3], true).sparse()] {
-        let renderer = renderer(&gpu, [65, 3], Outputs::FILTERED, "geometry");
+    let glossy = Frame::new([65, 37], true).with_gloss().sparse();
+    for frame in [Frame::new([65, 3], true), Frame::new([65, 3], true).sparse(), glossy] {
+        let renderer = renderer(&gpu, frame.size, Outputs::FILTERED, "geometry");
         frame.upload(&renderer);
         let film = frame.film();
         let aovs = Aovs::find(&film, &Names::new()).unwrap();
@@ -400,7 +448,7 @@ fn expected_errors_agree_with_their_twin() {
         let filtered = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap();
         let device = filtered.join(&gpu).unwrap().expected.unwrap();
         let Frame { stats, light, guide, blur, .. } = frame;
-        let pixels = Pixels { size, holds: Holds::film(true, true, false, 1), stats, light, guide, blur };
+        let pixels = Pixels { size, holds: Holds::film(true, true, false, 1), stats, light, guide, blur, gloss: true };
         let parts = demodulate(&pixels, demodulation, false);
         let (output, expected) = estimated(&parts.input, &settings);
         let host = expected::reference(&parts, &output, &expected).unwrap();

@@ -65,7 +65,7 @@ impl Case {
 /// When the file lacks its colour.
 pub fn parts(source: &Source, demodulation: Demodulation) -> anyhow::Result<Parts> {
     let aovs = Aovs::find(&source.film, &Names::new()).map_err(|what| anyhow!(what))?;
-    Ok(twin::split(&aovs, demodulation))
+    Ok(twin::split(&aovs, demodulation, false /* as the papers divide by albedo */))
 }
 
 fn picture(source: &Source) -> anyhow::Result<Picture> {

@@ -1,6 +1,7 @@
 use super::*;
 use crate::image::aov::{Aov, Names};
 use crate::image::{Film, Samples};
+use crate::math::hash::{pcg, unit_interval};
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 
@@ -13,7 +14,7 @@ fn film() -> Film {
 }
 
 fn take_apart(film: &Film, demodulation: Demodulation) -> Parts {
-    split(&Aovs::find(film, &Names::new()).unwrap(), demodulation)
+    split(&Aovs::find(film, &Names::new()).unwrap(), demodulation, false)
 }
 
 #[test]
@@ -294,7 +295,7 @@ fn samples_are_those_that_the_head_of_a_file_tells_or_taken_for_some() {
     film.add("samples", Samples::U32(vec![7; 4]));
     assert_eq!(count(&film), 7.0, "a pixel's own");
     let told = Aovs::find(&film, &Names::from([(Aov::Samples, "100".to_owned())])).unwrap();
-    assert_eq!(split(&told, Demodulation::Off).input.radiance[0][3], 25.0, "the user's number goes first");
+    assert_eq!(split(&told, Demodulation::Off, false).input.radiance[0][3], 25.0, "the user's number goes first");
 }
 
 #[test]
@@ -330,5 +331,121 @@ fn positions_and_depths_are_made_of_each_other_and_it_is_said() {
         assert_eq!([0, 1, 2, 3].map(|i| guide[i].depth), [1.0, 1.0, 1.0, 0.0]);
         let aovs = Aovs::find(&film, &Names::new()).unwrap();
         assert!(Layers::new(&aovs).notes.contains(&"depth: made of the position, the same for all".to_owned()));
+    }
+}
+
+/// Whether a pixel of 64 a row lies on one of the darker tiles.
+fn is_dark(i: usize) -> bool {
+    (i % 64 / 4 + i / 256).is_multiple_of(2)
+}
+
+/// A wall of tiles, four pixels wide, whose albedo is .3 and .6 in turn, under `light` of a pixel and its albedo.
+fn tiles(light: impl Fn(usize, f32) -> f32) -> Film {
+    let side = 64;
+    let albedo: Vec<vec3> =
+        (0..side * side).map(|i| if (i % side / 4 + i / side / 4) % 2 == 0 { [0.3; 3] } else { [0.6; 3] }).collect();
+    let place = |i: usize| [(i % side) as f32, (i / side) as f32, 0.0].map(|v| v * 0.01);
+    let of = |i: usize| albedo[i].map(|a| light(i, a));
+    let mut film = Film::new(side as u32, side as u32);
+    film.add_vec3("", RGB, &(0..side * side).map(of).collect::<Vec<_>>());
+    film.add_vec3("albedo", RGB, &albedo);
+    film.add_vec3("direct", RGB, &vec![[0.0; 3]; side * side]);
+    film.add_vec3("indirect", RGB, &(0..side * side).map(of).collect::<Vec<_>>());
+    film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+    film.add_vec3("N", ["X", "Y", "Z"], &vec![[0.0, 0.0, 1.0]; side * side]);
+    film.add_vec3("P", ["X", "Y", "Z"], &(0..side * side).map(place).collect::<Vec<_>>());
+    film.add("Z", Samples::F32(vec![1.0; side * side]));
+    film
+}
+
+fn adapted(film: &Film) -> Parts {
+    split(&Aovs::find(film, &Names::new()).unwrap(), Demodulation::Light, true)
+}
+
+/// Brightest over darkest of what is filtered.
+fn contrast(parts: &Parts) -> f32 {
+    let light = || parts.input.radiance.iter().map(|c| c[1]);
+    light().fold(0.0, f32::max) / light().fold(f32::INFINITY, f32::min)
+}
+
+/// A gloss mirrors .3 of light without noise, and the tiles scatter .5 of what they reflect: light is .5 A + .3, with a mean of .525 over
+/// the mean albedo .45. The slope relative to the means is .5 * .45 / .525 = 3/7, so that light is divided by 3/7 A + 4/7 * .45, which is
+/// 6/7 of it: 7/6 is left everywhere. Divided by albedo alone, .45 / .3 and .6 / .6 show the tiles.
+#[test]
+fn what_a_gloss_mirrors_does_not_follow_albedo() {
+    let film = tiles(|_, albedo| 0.5 * albedo + 0.3);
+    let (with, without) = (adapted(&film), take_apart(&film, Demodulation::Light));
+    println!("{} {}", contrast(&with), contrast(&without));
+    assert!((contrast(&without) - 1.5).abs() < 1e-4, "{}", contrast(&without));
+    // Windows do not hold as many pixels of both kinds of tiles.
+    assert!(contrast(&with) < 1.02, "{}", contrast(&with));
+    assert!(with.input.radiance.iter().all(|c| (c[0] - 7.0 / 6.0).abs() < 0.02));
+    let joined = with.remodulate(&with.input.radiance);
+    let off = joined.iter().zip(&with.input.guide).map(|(p, g)| (p[1] - (0.5 * g.albedo[1] + 0.3)).abs());
+    assert!(off.fold(0.0, f32::max) < 1e-6, "what is taken apart is put together again");
+}
+
+/// Light of which a half is noise, on tiles without a gloss, also with a shadow that ends across tiles.
+#[test]
+fn light_that_follows_albedo_is_divided_by_it() {
+    let noise = |i: usize| unit_interval(pcg(i as u32));
+    for (shadow, most) in [(1.0, 0.01), (0.2, 0.03)] {
+        let film = tiles(|i, albedo| albedo * (0.5 + noise(i)) * if i % 64 < 30 { 1.0 } else { shadow });
+        let (with, without) = (adapted(&film), take_apart(&film, Demodulation::Light));
+        let off = with.factor.iter().zip(&without.factor).map(|(a, b)| (a[1] / b[1] - 1.0).abs()).fold(0.0, f32::max);
+        assert!(off < most, "{shadow}: {off}");
+    }
+}
+
+/// Glossy tiles, the right half of them `changed`: pixels there keep their factors, those of the left half do not.
+fn only_the_left_half(changed: impl Fn(&mut Film)) {
+    let mut film = tiles(|i, albedo| if i % 64 < 32 { 0.5 * albedo + 0.3 } else { albedo });
+    changed(&mut film);
+    let (with, without) = (adapted(&film), take_apart(&film, Demodulation::Light));
+    let moved = |i: usize| (with.factor[i][1] / without.factor[i][1] - 1.0).abs();
+    let [left, right]: [Vec<usize>; 2] = [0, 32].map(|first| (0..4096).filter(|i| i % 64 / 32 * 32 == first).collect());
+    assert!(left.iter().all(|&i| moved(i) > 0.1), "control: the gloss is found");
+    let most = right.iter().map(|&i| moved(i)).fold(0.0, f32::max);
+    assert!(most < 1e-6, "{most}");
+}
+
+fn replace(film: &mut Film, layer: &str, names: [&str; 3], values: &[vec3]) {
+    film.channels.retain(|c| !c.name.starts_with(&format!("{layer}.")));
+    film.add_vec3(layer, names, values);
+}
+
+/// Tiles without a gloss beside glossy ones, on a wall behind theirs or of a sixth of their albedo.
+#[test]
+fn other_surfaces_and_other_materials_do_not_count() {
+    only_the_left_half(|film| {
+        let place = |i: usize| [(i % 64) as f32 * 0.01, (i / 64) as f32 * 0.01, if i % 64 < 32 { 0.0 } else { -0.5 }];
+        replace(film, "P", ["X", "Y", "Z"], &(0..4096).map(place).collect::<Vec<_>>());
+    });
+    only_the_left_half(|film| {
+        let share = |i: usize| if i % 64 < 32 { 1.0 } else { 1.0 / 6.0 };
+        let albedo = |i: usize| share(i) * if is_dark(i) { 0.3 } else { 0.6 };
+        let light = |i: usize| if i % 64 < 32 { [0.5 * albedo(i) + 0.3; 3] } else { [albedo(i); 3] };
+        let of = |f: &dyn Fn(usize) -> vec3| (0..4096).map(f).collect::<Vec<_>>();
+        replace(film, "albedo", RGB, &of(&|i| [albedo(i); 3]));
+        replace(film, "indirect", RGB, &of(&light));
+        film.channels.retain(|c| !RGB.contains(&c.name.as_str()));
+        film.add_vec3("", RGB, &of(&light));
+    });
+}
+
+/// White light from a gloss on red tiles and tiles of two greys: what is taken apart is put together again, and what red does not
+/// reflect stays out.
+#[test]
+fn channels_that_are_not_reflected_stay_so() {
+    let mut film = tiles(|_, albedo| 0.5 * albedo + 0.3);
+    let albedo: Vec<vec3> = (0..4096).map(|i| if is_dark(i) { [0.3, 0.0, 0.005] } else { [0.6, 0.0, 0.01] }).collect();
+    replace(&mut film, "albedo", RGB, &albedo);
+    let with = adapted(&film);
+    assert!(with.factor.iter().zip(&albedo).all(|(f, a)| f[1] == 0.0 && f[2] >= a[2].min(0.005)));
+    assert!(with.factor.iter().zip(&albedo).any(|(f, a)| (f[0] - a[0]).abs() > 0.05), "control: the gloss is found");
+    let joined = with.remodulate(&with.input.radiance);
+    for (joined, i) in joined.iter().zip(0..) {
+        let whole = 0.5 * if is_dark(i) { 0.3 } else { 0.6 } + 0.3;
+        assert!((joined[0] - whole).abs() < 1e-5 && (joined[2] - whole).abs() < 1e-5, "{joined:?} of {whole}");
     }
 }
