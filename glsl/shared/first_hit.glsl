@@ -43,9 +43,10 @@ bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
 }
 
 // The first surface that `ray` shows, behind smooth ones, or the sky. Depth and position are as if the way had been straight, so
-// that they change as the image does; a normal that points back along the way tells where in the sky it ends. The albedo is what
-// the light from there is multiplied by on its way. `first` becomes the first hit, smooth or not, and `kept` the albedo that paths
-// keep which begin like this: see `seen_albedo`.
+// that they change as the image does; a normal that points back along the way tells where in the sky it ends. The sky has the object and the
+// material of the smooth surface, as filters take what has neither for sky that is seen by itself. The albedo is what the light from there is
+// multiplied by on its way. `first` becomes the first hit, smooth or not, and `kept` the albedo that paths keep which begin like this: see
+// `seen_albedo`.
 Guide seen_hit(Ray ray, uint seed, out Guide first, out Hit first_hit, out vec3 kept) {
     Sight sight = Sight(ray, 0.0, vec3(1.0), vec3(0.0), 1.0);
     Guide seen;
@@ -75,6 +76,10 @@ Guide seen_hit(Ray ray, uint seed, out Guide first, out Hit first_hit, out vec3 
             seen.depth = from_start + camera.near;
             seen.position = ray.origin + from_start * ray.direction;
             seen.albedo = throughput * (sky ? vec3(1.0) : seen.albedo);
+            if (sky) {
+                seen.object = first.object;
+                seen.material = first.material;
+            }
         }
         sight.walked = from_start;
         bounce++;

@@ -143,6 +143,7 @@ impl Sight {
 /// What a primary ray shows, behind smooth surfaces.
 pub fn seen_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, seed: u32) -> SeenHit {
     let FirstHit { mut guide, mut hit } = first_hit(scene, frame, ray, mask_seed(seed, 0));
+    let (object, material) = (guide.object, guide.material);
     let way = Ray { origin: ray.origin, direction: ray.direction };
     let mut sight = Sight { way, throughput: Vec3::ONE, albedo: Vec3::ZERO, share: 1.0 };
     let mut length = 0.0;
@@ -154,7 +155,7 @@ pub fn seen_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, seed: u32) -> 
         FirstHit { guide, hit } = first_hit(scene, frame, &sight.way, mask_seed(seed, 2 * bounce));
         let (sky, behind) = (!hit.any(), if hit.any() { hit.t } else { 0.0 });
         if sky {
-            guide.normal = (-sight.way.direction).into();
+            guide = Guide { normal: (-sight.way.direction).into(), object, material, ..guide };
         }
         guide.depth = length + behind + frame.camera.near;
         guide.position = (ray.origin + (length + behind) * ray.direction).into();

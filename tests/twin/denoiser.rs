@@ -2,6 +2,7 @@
 //! the twins.
 use crate::picture;
 use crate::support::{self, assert_silent, gpu, hash};
+use crate::twin::Workplace;
 use std::path::Path;
 use tallow::denoise::file::Layers;
 use tallow::denoise::filter::firefly::Fireflies;
@@ -400,6 +401,36 @@ fn a_film_and_its_file_become_one_picture() {
             assert!(of_film == of_file, "{}", row.name);
         }
     }
+    assert_silent(&gpu);
+}
+
+/// So are those of a render in which a mirror and glass show the sky, which no layer of a file names, but for rounding.
+#[test]
+fn a_render_of_mirrored_sky_and_its_file_become_one_picture() {
+    let gpu = gpu();
+    let ball = |material: &str, x: f32| {
+        format!("[[mesh]]\nshape = 'sphere'\nmaterial = '{material}'\ntransform = {{ translate = [{x}, 0, 0] }}\n")
+    };
+    let scene = Workplace::new().sky("sky.exr", 32, 16, |x, y| (1 + (x * 5 + y * 3) % 7) as f32).scene(&format!(
+        "[camera]\nposition = [0, 1, 6]\ntarget = [0, 0, 0]\nfov = 40\n[environment]\nfile = 'sky.exr'\n\
+         [[material]]\nname = 'mirror'\ntype = 'conductor'\nmetal = 'Cu'\nalpha = 0\n\
+         [[material]]\nname = 'glass'\ntype = 'dielectric'\n{}{}",
+        ball("mirror", -1.1),
+        ball("glass", 1.1)
+    ));
+    let scene = scene.with(|s| (s.width, s.height, s.spp) = (64, 40, 4));
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::FILTERED).unwrap();
+    let job = Job::new(&renderer);
+    let film = job.film(&job.run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap()).unwrap();
+    let aovs = Aovs::find(&film, &Names::new()).unwrap();
+    let settings = |scales: &Scales| FilterSettings::default().scaled_by(scales);
+    let recipe = Recipe { settings: &settings, ..Recipe::new(find("auto").unwrap().into()) };
+    let images = [Noisy::of_film(&renderer).unwrap(), Layers::new(&aovs).upload(&gpu).unwrap()];
+    let [of_film, of_file] =
+        images.map(|noisy| Filtered::new(&gpu, noisy, &recipe).unwrap().join(&gpu).unwrap().colour);
+    let off = |c: usize| of_film[c].iter().zip(&of_file[c]).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let off = [0, 1, 2].map(off);
+    assert!(off.iter().all(|&off| off < 1e-5), "{off:?}, of light up to 7");
     assert_silent(&gpu);
 }
 
