@@ -1,5 +1,7 @@
 #include "shared/thread.glsl"
+#include "shared/albedo.glsl"
 #include "shared/luminance.glsl"
+#include "shared/sampled_albedo.glsl"
 #include "shared/sanitise.glsl"
 #include "shared/candidates.glsl"
 #include "shared/dominated.glsl"
@@ -16,7 +18,6 @@ layout(binding = 2) uniform samplerBuffer others; // of vec4
 layout(binding = 3) uniform samplerBuffer colour; // of vec4
 layout(binding = 4) uniform usamplerBuffer place; // of uvec4
 layout(binding = 5) uniform samplerBuffer wide; // of vec4
-layout(binding = 6) uniform samplerBuffer mid; // of vec4
 layout(binding = 7) uniform samplerBuffer narrow; // of vec4, of what it gets
 layout(binding = 8) uniform samplerBuffer wide_dim; // of vec4, of the same
 layout(binding = 9) uniform samplerBuffer svgf; // of vec4
@@ -27,6 +28,7 @@ layout(scalar, binding = 13) writeonly buffer Blend { vec4 blend[]; };
 layout(scalar, binding = 14) writeonly buffer Expected { vec3 expected[]; };
 layout(binding = 15) uniform samplerBuffer estimate; // of vec4
 layout(binding = 16) uniform usamplerBuffer guide; // of Guide
+layout(binding = 17) uniform samplerBuffer mid; // of vec4
 layout(scalar, push_constant) uniform Push { AutoPush push; };
 
 #include "shared/own_variance.glsl"
@@ -50,6 +52,7 @@ const float ENOUGH_TO_TELL_ONE = 8.0;
 // is left that is certain (Veach's plates at 2: relMSE .046 in place of .035), and lamps out of focus are dark beside for sure (.27 in
 // place of .21 at 4).
 const float ENOUGH_TO_DOUBT = 4.0;
+const int NEAR = 1; // pixels from one that a lens blurs within which no lamp or sky may be, for like pixels to count there
 const float MAX_ERROR = 1e24; // is above every error
 
 // Mean products of what left-out pixels are missed by. An independent copy of the pixel misses it by the noise of both, and shares the
@@ -83,6 +86,24 @@ void exchange(inout float w[5], inout float growth[5], float missed[5][5], bool 
             }
         }
     }
+}
+
+// Whether a pixel shows a surface that reflects light.
+bool shaded(int i) {
+    return Guide_object(guide, i) != NONE && reflects(sampled_albedo(i, texelFetch(colour, i).w, Guide_albedo(guide, i)));
+}
+
+// Whether what like pixels tell of noise counts. Where a lens blurs lamps or shows an empty sky it does not: pixels beside those are dark
+// for sure though a few samples of like ones are bright. What it blurs of shaded surfaces is dark by chance, and had black specks without.
+bool tell_like_pixels(int at) {
+    if (!blurred(at)) return true;
+    ivec2 size = ivec2(push.size), p = ivec2(at % size.x, at / size.x);
+    ivec2 first = max(p - NEAR, ivec2(0)), last = min(p + NEAR, size - 1);
+    bool all_shaded = true;
+    for (int y = first.y; y <= last.y; y++) {
+        for (int x = first.x; x <= last.x; x++) all_shaded = all_shaded && shaded(y * size.x + x);
+    }
+    return all_shaded;
 }
 
 void main() {
@@ -135,6 +156,6 @@ void main() {
     float of_mean = own_variance(at, c.w), bright = luminance(all), most = OF_ONE_SAMPLE * max(luminance(d.rgb), 0.0);
     bool dominated = usable[4] && c.w >= ENOUGH_TO_TELL_ONE && of_mean >= 0.0 && sqrt(of_mean) > DOMINATED * abs(luminance(c.rgb));
     if (dominated && bright > most && luminance(c.rgb) >= bright) all *= most / bright;
-    bool doubted = of_mean >= 0.0 && c.w >= ENOUGH_TO_DOUBT && !blurred(at);
+    bool doubted = of_mean >= 0.0 && c.w >= ENOUGH_TO_DOUBT && tell_like_pixels(at);
     blend[i] = any_usable ? vec4(all, doubted ? max(of_mean, texelFetch(estimate, at).w) : of_mean) : vec4(vec3(0.0), UNFILTERED);
 }

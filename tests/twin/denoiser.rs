@@ -128,6 +128,16 @@ impl Frame {
         self
     }
 
+    /// The same with guides as a film has them, of other rays than the samples: those of every second pixel have found no surface that
+    /// reflects.
+    fn of_other_rays(mut self) -> Self {
+        for (i, guide) in self.guide.iter_mut().enumerate() {
+            guide.material = if self.blur[i] > 0.0 { NONE } else { 0 };
+            guide.albedo = if i % 2 == 0 && self.stats[i].count > 0 { [0.0; 3] } else { guide.albedo };
+        }
+        self
+    }
+
     /// Every fifth pixel without a sample, and so without light of its own.
     fn sparse(mut self) -> Self {
         for i in (0..self.stats.len()).step_by(5) {
@@ -377,9 +387,11 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
 #[test]
 fn a_film_and_its_file_become_one_picture() {
     let gpu = gpu();
+    let [whole, sparse] = [Frame::new([65, 3], true), Frame::new([65, 3], true).sparse()];
+    let blurred = Frame::new([65, 3], false).sparse().through_lens().of_other_rays();
     let glossy = Frame::new([65, 37], true).with_gloss().sparse();
-    for frame in [Frame::new([65, 3], true), Frame::new([65, 3], true).sparse(), glossy] {
-        let renderer = renderer(&gpu, frame.size, Outputs::FILTERED, "geometry");
+    for (frame, lens) in [(whole, 0.0), (sparse, 0.0), (blurred, 0.1), (glossy, 0.0)] {
+        let renderer = renderer_of(&gpu, frame.size, Outputs::FILTERED, "geometry", 1, lens);
         frame.upload(&renderer);
         let film = frame.film();
         let aovs = Aovs::find(&film, &Names::new()).unwrap();

@@ -107,6 +107,49 @@ fn pixels_without_variance_do_not_make_others_sure() {
     }
 }
 
+/// The same where a lens blurs a wall of albedo .5. Where like pixels did not count for the noise of what is blurred, it had black specks.
+#[test]
+fn what_a_lens_blurs_of_a_wall_has_no_specks() {
+    let mut input = sampled(4, |i, k| if random(i, k) < 1.0 / 32.0 { 32.0 } else { 0.0 });
+    for guide in &mut input.guide {
+        (guide.material, guide.albedo) = (NONE, [0.5; 3]);
+    }
+    for (image, of) in filtered(&input).iter().zip(["kernel", "twin"]) {
+        let darkest = image.iter().copied().fold(f32::INFINITY, f32::min);
+        let mean = image.iter().sum::<f32>() / image.len() as f32;
+        println!("{of}: {darkest} to a mean of {mean}");
+        assert!(darkest > 0.3 && (mean - 1.0).abs() < 0.15, "{of}: {darkest}, {mean}");
+    }
+}
+
+/// Lamps out of focus, each a disk of pixels that one sample in six finds; all other pixels are dark for sure. One pixel of three by three
+/// shows a lamp, which reflects nothing, or the sky, where nothing was hit. Were they taken for a wall, lamps would have fog around them.
+#[test]
+fn lamps_that_a_lens_blurs_have_no_fog_around_them() {
+    let width = SIZE[0];
+    let off = |at: u32| (at % 16) as f32 - 8.0;
+    let in_disk = |i: u32| off(i % width).hypot(off(i / width)) < 4.5;
+    let wall = sampled(4, |i, k| if in_disk(i) && random(i, k) < 1.0 / 6.0 { 60.0 } else { 0.0 });
+    let fog = |albedo: f32, object: u32| {
+        let mut input = wall.clone();
+        for (i, guide) in (0..).zip(&mut input.guide) {
+            (guide.material, guide.albedo) = (NONE, [0.5; 3]);
+            if i % width % 3 == 1 && i / width % 3 == 1 {
+                (guide.albedo, guide.object) = ([albedo; 3], object);
+            }
+        }
+        filtered(&input).map(|image| {
+            let around = (0..).zip(&image).filter(|(i, _)| !in_disk(*i)).map(|(_, light)| light.powi(2));
+            around.sum::<f32>() / image.len() as f32
+        })
+    };
+    let [of_wall, beside_lamps, before_sky] = [fog(0.5, 0), fog(0.0, 0), fog(0.5, NONE)];
+    println!("kernel and twin: {of_wall:?} of a wall, {beside_lamps:?} beside lamps, {before_sky:?} before a sky");
+    for k in [0, 1] {
+        assert!(beside_lamps[k] < 0.5 * of_wall[k] && before_sky[k] < 0.5 * of_wall[k], "{k}");
+    }
+}
+
 /// The image of a small sun, of 400, which half of the samples of nine pixels find, on light of .2. What its pixels tell of their variance
 /// makes no fog of it plausible where no sample of sixteen has found it: light of .37 was left around it.
 #[test]

@@ -13,8 +13,8 @@ pub struct FilterInput {
     /// other pixel takes anything from it, and it is in-painted where the filter can.
     pub radiance: Vec<vec4>,
     /// One per pixel; zero normals, positions and depths where there is nothing to be seen or nothing is known. `auto` also reads
-    /// `material`: [`NONE`](crate::layout::NONE) where nothing is hit or a lens blurs what is, else any other number; and `albedo`, that
-    /// which the light was divided by, 0 where it was divided by none.
+    /// `object`: [`NONE`](crate::layout::NONE) where nothing is hit; `material`: the same where a lens blurs what is hit, too, else any
+    /// other number; and `albedo`, that which the light was divided by, 0 where it was divided by none.
     pub guide: Vec<Guide>,
     /// Variance of each pixel's mean, per channel.
     pub variance: Option<Vec<vec3>>,

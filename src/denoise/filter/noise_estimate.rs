@@ -89,7 +89,7 @@ pub fn own_variance(input: &FilterInput, at: usize, count: f32) -> Option<f32> {
 fn told_around(input: &FilterInput, image: &[Packed], own: &[Option<f32>], at: usize, rates: &Rates) -> f32 {
     let (blurs, of_pixel) = (blurred(&input.guide[at]), own[at].unwrap_or(0.0));
     let (mut total, mut sum) = (0.0, 0.0);
-    for (q, variance) in window(input, at).filter_map(|q| Some((&image[q], own[q]?))) {
+    for (q, variance) in window(input, at, REACH).filter_map(|q| Some((&image[q], own[q]?))) {
         let tells = if blurs { 1.0 } else { tells(of_pixel + variance, contrast(q.colour, image[at].colour)) };
         let w = tells * edge_weight(q, rates.exponent(&image[at], q));
         total += w;
@@ -113,18 +113,18 @@ pub fn blurred(guide: &Guide) -> bool {
     guide.material == NONE
 }
 
-/// The pixels around one, and itself.
-fn window(input: &FilterInput, at: usize) -> impl Iterator<Item = usize> {
+/// The pixels as near to one along both axes, and itself.
+pub fn window(input: &FilterInput, at: usize, reach: i64) -> impl Iterator<Item = usize> + use<> {
     let (width, height) = (i64::from(input.width), i64::from(input.height));
     let (x, y) = (at as i64 % width, at as i64 / width);
-    let rows = (y - REACH).max(0)..=(y + REACH).min(height - 1);
-    let columns = (x - REACH).max(0)..=(x + REACH).min(width - 1);
+    let rows = (y - reach).max(0)..=(y + reach).min(height - 1);
+    let columns = (x - reach).max(0)..=(x + reach).min(width - 1);
     rows.flat_map(move |v| columns.clone().map(move |u| (v * width + u) as usize))
 }
 
 fn spread(input: &FilterInput, image: &[Packed], at: usize, rates: &Rates) -> f32 {
     let (mut total, mut squares, mut mean, mut m2) = (0.0, 0.0, 0.0, 0.0);
-    for q in window(input, at).map(|q| &image[q]) {
+    for q in window(input, at, REACH).map(|q| &image[q]) {
         let w = edge_weight(q, rates.exponent(&image[at], q));
         let off = contrast(q.colour, image[at].colour);
         total += w;

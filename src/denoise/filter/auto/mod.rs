@@ -16,8 +16,8 @@ use super::svgf::Levels;
 use super::{Filter, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{AutoPush, vec2, vec3, vec4};
-use crate::shaders::shared::own_variance;
+use crate::layout::{AutoPush, PixelLight, vec2, vec3, vec4};
+use crate::shaders::shared::{own_variance, sampled_albedo};
 use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual};
 use crate::threads::{both, each};
 
@@ -94,9 +94,10 @@ struct Auto {
     leverage: Kernel<auto_leverage::Bind<'static>>,
     error: Kernel<auto_error::Bind<'static>>,
     smoothing: Smoothing,
-    /// Without and with a variance to read.
-    blend: [Kernel<auto::Bind<'static>>; 2],
-    nothing: Buffer<vec3>,
+    /// Without and with a variance to read, each without and with the albedo of samples.
+    blend: [Kernel<auto::Bind<'static>>; 4],
+    no_variance: Buffer<vec3>,
+    no_light: Buffer<PixelLight>,
     residual: Kernel<auto_residual::Bind<'static>>,
     /// What all windows read of the image.
     windows_pack: Packed,
@@ -141,20 +142,21 @@ impl Auto {
         let levels = || Levels::new(gpu, &of_svgf.edge, &of_svgf.svgf, of_svgf.footprint.levels, size, true);
         let estimate = |(edge, cautious)| Estimate::new(gpu, edge, cautious, size);
         let estimates = || each([(&settings.edge, true), (&of_svgf.edge, false)], estimate);
-        let blend = |measured| {
+        let blend = |[measured, has_light]: [bool; 2]| {
             let own_variance = own_variance::Constants { measured };
-            Kernel::new(gpu, &auto::Constants { own_variance, ..Default::default() })
+            let sampled_albedo = sampled_albedo::Constants { has_light };
+            Kernel::new(gpu, &auto::Constants { own_variance, sampled_albedo, ..Default::default() })
         };
+        let blends = || each([[false, false], [false, true], [true, false], [true, true]], blend);
         let residual = || Kernel::new(gpu, &auto_residual::Constants { edge: surfaces, local_size_x });
-        let ((windows, smoothing), ((svgf, [estimate, svgf_estimate]), (blend, residual))) = both(
-            || both(windows, smoothing),
-            || both(|| both(levels, estimates), || both(|| each([false, true], blend), residual)),
-        )?;
+        let ((windows, smoothing), ((svgf, [estimate, svgf_estimate]), (blend, residual))) =
+            both(|| both(windows, smoothing), || both(|| both(levels, estimates), || both(blends, residual)))?;
         Ok(Self {
             inputs: Kernel::new(gpu, &Default::default())?,
             leverage: Kernel::new(gpu, &auto_leverage::Constants { edge: surfaces, ..Default::default() })?,
             error: Kernel::new(gpu, &Default::default())?,
-            nothing: Buffer::from_slice(gpu, "no variance", &[])?,
+            no_variance: Buffer::from_slice(gpu, "no variance", &[])?,
+            no_light: Buffer::new(gpu, "no light", 1, Location::Device)?,
             results: [plane("wide")?, plane("middle")?, plane("narrow")?, plane("svgf")?],
             dim: Buffer::new(gpu, "dim", windows_pack.colour.len(), Location::Device)?,
             wide_dim: plane("wide, dim")?,
@@ -280,15 +282,16 @@ impl Filter for Auto {
             narrow,
             wide_dim: &self.wide_dim,
             svgf,
-            variance: planes.variance.as_ref().unwrap_or(&self.nothing),
+            variance: planes.variance.as_ref().unwrap_or(&self.no_variance),
             surroundings: &self.surroundings,
             leverages: &self.leverages,
             blend: self.blended(),
             expected: &self.expected,
             estimate: &self.estimate.plane,
             guide: &planes.guide,
+            sampled_albedo: sampled_albedo::Bind { light: planes.light.as_ref().unwrap_or(&self.no_light) },
         };
-        let blend = &self.blend[usize::from(planes.variance.is_some())];
+        let blend = &self.blend[2 * usize::from(planes.variance.is_some()) + usize::from(planes.light.is_some())];
         rec.dispatch_threads(blend, bind, &self.push(planes.size), planes.pixels())?;
         self.record_residual(rec, planes)
     }

@@ -1,10 +1,11 @@
 //! What `auto` gives back of what its blend has lost: the twin of `glsl/auto/auto_residual.comp`.
 use crate::denoise::filter::FilterInput;
 use crate::denoise::filter::edge::{Rates, edge_weight};
-use crate::denoise::filter::noise_estimate::{blurred, contrast, own_variance};
+use crate::denoise::filter::noise_estimate::{blurred, contrast, own_variance, window};
 use crate::denoise::filter::pack::Packed;
-use crate::layout::vec4;
-use crate::shaders::auto::ENOUGH_TO_DOUBT;
+use crate::denoise::filter::pixel::reflects;
+use crate::layout::{NONE, vec4};
+use crate::shaders::auto::{ENOUGH_TO_DOUBT, NEAR};
 use crate::shaders::auto_residual::{self, ENOUGH_PIXELS, ENOUGH_SAMPLES, NARROW, PRIOR_SAMPLES, SIGNIFICANT};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
@@ -19,7 +20,7 @@ pub fn given_back(
 ) -> Vec<vec4> {
     let size = input.size().map(i64::from);
     let own: Vec<Option<f32>> = (0..image.len()).map(|i| own_variance(input, i, image[i].count)).collect();
-    let doubted = |i: usize| image[i].count >= ENOUGH_TO_DOUBT && !blurred(&input.guide[i]);
+    let doubted = |i: usize| image[i].count >= ENOUGH_TO_DOUBT && tell_like_pixels(input, i);
     let residual = |i: usize| Residual {
         blended: blend[i].xyz(),
         colour: image[i].colour - blend[i].xyz(),
@@ -33,6 +34,12 @@ pub fn given_back(
     let restored =
         |i: usize| -> vec4 { restored(image, &residuals, size, i, surfaces, prior(i)).extend(blend[i].w).into() };
     (0..image.len()).map(restored).collect()
+}
+
+/// Whether what like pixels tell of noise counts, as in `auto.comp`.
+fn tell_like_pixels(input: &FilterInput, at: usize) -> bool {
+    let shaded = |q: usize| input.guide[q].object != NONE && reflects(&input.guide[q].albedo);
+    !blurred(&input.guide[at]) || window(input, at, NEAR as i64).all(shaded)
 }
 
 /// Sums over the like pixels of a window.
